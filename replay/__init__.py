@@ -1,0 +1,43 @@
+"""Record-and-replay batch service for mechanical systems: collisions and proximity sensors, frame by frame.
+
+The names below are the public interface. They are resolved on first use, so that `import replay` costs nothing:
+numba, rerun, trimesh and scipy load only when something needs them.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from replay.recording.reader import read as read
+    from replay.recording.record import record as record
+    from replay.scenario.load import load as load
+    from replay.simulation import FrameBlock as FrameBlock
+    from replay.simulation import simulate as simulate
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "load": "replay.scenario.load",
+    "simulate": "replay.simulation",
+    "FrameBlock": "replay.simulation",
+    "record": "replay.recording.record",
+    "read": "replay.recording.reader",
+    "Recording": "replay.recording.reader",
+}
+_ROOMS = ("errors", "numerics", "geometry", "kinematics", "collision", "sensing", "scenario", "recording", "simulation")
+
+__all__ = [*_PUBLIC, *_ROOMS]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(importlib.import_module(_PUBLIC[name]), name)
+    if name in _ROOMS:
+        return importlib.import_module(f"replay.{name}")
+    raise AttributeError(f"module 'replay' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""Pairs, broad phase, GJK and the pipeline that finds level and clearance of every pair."""

@@ -1,0 +1,108 @@
+"""Everything `replay` raises on purpose: one base class, one class per cause, the values kept as attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class ReplayError(Exception):
+    """Base of every error that `replay` raises on purpose; its text is one clear line for the user."""
+
+
+class InvalidValue(ReplayError):
+    """An argument of a public function is outside what the function accepts."""
+
+    def __init__(self, name: str, value: object, rule: str) -> None:
+        self.name = name
+        self.value = value
+        self.rule = rule
+        super().__init__(f"{name} = {value}: {rule}")
+
+
+class Problem:
+    """One thing wrong at one place of a scenario, rules or model file."""
+
+    def __init__(
+        self, message: str, *, file: str | None = None, line: int | None = None, column: int | None = None
+    ) -> None:
+        self.message = message
+        self.file = file
+        self.line = line
+        self.column = column
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{place}: {self.message}" if place else self.message
+
+
+class ScenarioError(ReplayError):
+    """A scenario (or a file it includes) is not valid; every problem found is listed, one line each."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class MotionLimitError(ReplayError):
+    """A script drives a joint beyond one of its limits."""
+
+    def __init__(self, joint: str, time: float, quantity: str, value: float, limit: float, unit: str) -> None:
+        self.joint = joint
+        self.time = time
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+        self.unit = unit
+        side = "above the upper" if value > limit else "below the lower"
+        super().__init__(
+            f"joint {joint!r}: {quantity} = {value:.6g} {unit} at t = {time:.6g} s is {side} limit {limit:.6g} {unit}"
+        )
+
+
+class MeshError(ReplayError):
+    """A mesh file cannot be read, or what it holds cannot be used as a body."""
+
+    def __init__(self, file: str, reason: str) -> None:
+        self.file = file
+        self.reason = reason
+        super().__init__(f"{file}: {reason}")
+
+
+class MissingPackageError(ReplayError):
+    """A Python package that this input or option needs is not installed."""
+
+    def __init__(self, package: str, needed_for: str, install: str) -> None:
+        self.package = package
+        self.needed_for = needed_for
+        self.install = install
+        super().__init__(f"{needed_for} needs the Python package {package!r}, which is not installed; {install}")
+
+
+class RecordingError(ReplayError):
+    """A recording cannot be read: not a recording, another format version, or damaged beyond use."""
+
+    def __init__(self, file: str, reason: str) -> None:
+        self.file = file
+        self.reason = reason
+        super().__init__(f"{file}: {reason}")
+
+
+class RecordingExistsError(ReplayError):
+    """The target of a run exists already and overwriting was not asked for."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        super().__init__(f"{file}: exists already; pass --overwrite to replace it, or -o DIR to write elsewhere")
+
+
+class WriteError(ReplayError):
+    """A file cannot be written: read-only target, full disk, missing folder."""
+
+    def __init__(self, file: str, reason: str) -> None:
+        self.file = file
+        self.reason = reason
+        super().__init__(f"{file}: cannot be written: {reason}")
+
+
+class ViewerError(ReplayError):
+    """The rerun viewer could not show or render a recording."""

@@ -1,0 +1,1 @@
+"""Shapes as triangles and convex pieces, bounding volumes, and the triangle tree."""

@@ -1,0 +1,207 @@
+"""Links and joints as trees, and forward kinematics of all frames at once."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue
+from replay.numerics import transforms
+
+Array = NDArray[np.float64]
+
+
+class JointType(enum.Enum):
+    """How a link may move relative to its parent link (or, for the root of a tree, to the world)."""
+
+    FIXED = "fixed"
+    REVOLUTE = "revolute"
+    CONTINUOUS = "continuous"
+    PRISMATIC = "prismatic"
+    FREE = "free"
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether the joint has one position: an angle [rad] or a length [m]."""
+        return self in (JointType.REVOLUTE, JointType.CONTINUOUS, JointType.PRISMATIC)
+
+    @property
+    def unit(self) -> str:
+        """The unit of the joint's position."""
+        return "m" if self is JointType.PRISMATIC else "rad"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What connects a link to its parent; limits in rad or m, per s and per s^2.
+
+    Attributes:
+        name: unique among the joints of a linkage.
+        type: see `JointType`.
+        axis: unit vector in the joint's frame; turned about or moved along.
+        lower, upper: position limits.
+        velocity, acceleration: limits on the absolute value.
+        initial: position while no script moves the joint.
+    """
+
+    name: str
+    type: JointType = JointType.FIXED
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    lower: float = -np.inf
+    upper: float = np.inf
+    velocity: float = np.inf
+    acceleration: float = np.inf
+    initial: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid part; `T_parent_joint` (4, 4) places its joint in the parent link's frame, or in the world for a root."""
+
+    name: str
+    parent: str | None
+    T_parent_joint: Array
+    joint: Joint
+
+
+@dataclass(frozen=True, eq=False)
+class LinkPoses:
+    """Poses of all links in n frames.
+
+    Attributes:
+        linkage: whose links these are, in the order of `linkage.link_names`.
+        local: (n, L, 4, 4), T_parent_link; T_world_link for the root of a tree.
+        world: (n, L, 4, 4), T_world_link.
+    """
+
+    linkage: Linkage
+    local: Array
+    world: Array
+
+    def relative(self, a: int, b: int) -> Array:
+        """Return T_a_b (n, 4, 4), pose of link b in link a, formed through their nearest common ancestor.
+
+        Two links of one tree never see the tree's place in the world, so a machine far from the origin reads the same.
+        """
+        up_a, up_b = self.linkage.chains_to_common_ancestor(a, b)
+        T_ancestor_a = self._chain(up_a)
+        T_ancestor_b = self._chain(up_b)
+        return transforms.compose(transforms.invert(T_ancestor_a), T_ancestor_b)
+
+    def slice(self, begin: int, end: int) -> LinkPoses:
+        """Return the poses of frames begin..end-1."""
+        return LinkPoses(self.linkage, self.local[begin:end], self.world[begin:end])
+
+    def _chain(self, links: Sequence[int]) -> Array:
+        pose = transforms.identity(len(self.local))
+        for link in reversed(links):
+            pose = transforms.compose(pose, self.local[:, link])
+        return pose
+
+
+class Linkage:
+    """All trees of links of a scene. Links and scalar joints are listed once, sorted by name.
+
+    Attributes:
+        links: tuple of L `Link`, sorted by name; `link_names` their names.
+        parents: (L,) int64, index of the parent link, -1 for the root of a tree.
+        joints: the J scalar joints (revolute, continuous, prismatic), sorted by name; `joint_names` their names.
+        free_joints: the K free joints, sorted by name; `free_names` their names.
+    """
+
+    def __init__(self, links: Sequence[Link]) -> None:
+        self.links = tuple(sorted(links, key=lambda link: link.name))
+        self.link_names = tuple(link.name for link in self.links)
+        index = {name: k for k, name in enumerate(self.link_names)}
+        if len(index) != len(self.links):
+            raise InvalidValue("links", sorted(self.link_names), "link names must be unique")
+        for link in self.links:
+            if link.parent is not None and link.parent not in index:
+                raise InvalidValue(f"links.{link.name}.parent", link.parent, f"must be one of {sorted(index)}")
+        self.parents = np.array([-1 if k.parent is None else index[k.parent] for k in self.links], dtype=np.int64)
+        self.joints = tuple(sorted((k.joint for k in self.links if k.joint.type.is_scalar), key=lambda j: j.name))
+        self.joint_names = tuple(joint.name for joint in self.joints)
+        free = (link.joint for link in self.links if link.joint.type is JointType.FREE)
+        self.free_joints = tuple(sorted(free, key=lambda joint: joint.name))
+        self.free_names = tuple(joint.name for joint in self.free_joints)
+        if len({*self.joint_names, *self.free_names}) != len(self.joints) + len(self.free_joints):
+            raise InvalidValue("joints", [*self.joint_names, *self.free_names], "joint names must be unique")
+        self._order = self._parents_first()
+        self._index = index
+
+    def link_index(self, name: str) -> int:
+        """Return the position of a link in `links`; KeyError when there is none of that name."""
+        return self._index[name]
+
+    def ancestors(self, link: int) -> list[int]:
+        """Return the links from `link` (first) up to the root of its tree (last)."""
+        chain = [link]
+        while self.parents[chain[-1]] >= 0:
+            chain.append(int(self.parents[chain[-1]]))
+        return chain
+
+    def chains_to_common_ancestor(self, a: int, b: int) -> tuple[list[int], list[int]]:
+        """Return the links from a and from b up to, and without, their nearest common ancestor (or the world)."""
+        above_a, above_b = self.ancestors(a), self.ancestors(b)
+        while above_a and above_b and above_a[-1] == above_b[-1]:
+            above_a.pop()
+            above_b.pop()
+        return above_a, above_b
+
+    def moves_between(self, a: int, b: int) -> bool:
+        """Return whether any joint on the way from link a to link b is not fixed."""
+        up_a, up_b = self.chains_to_common_ancestor(a, b)
+        return any(self.links[k].joint.type is not JointType.FIXED for k in (*up_a, *up_b))
+
+    def are_adjacent(self, a: int, b: int) -> bool:
+        """Return whether links a and b are joined by a joint."""
+        return bool(self.parents[a] == b or self.parents[b] == a)
+
+    def forward(self, positions: Array, free_poses: Array) -> LinkPoses:
+        """Return the poses of all links.
+
+        Args:
+            positions: (n, J) joint positions [rad or m], in the order of `joint_names`.
+            free_poses: (n, K, 4, 4) poses of the free joints' links in their joints' frames, as `free_names`.
+        """
+        n = len(positions)
+        local = np.empty((n, len(self.links), 4, 4))
+        world = np.empty_like(local)
+        scalar = {name: k for k, name in enumerate(self.joint_names)}
+        free = {name: k for k, name in enumerate(self.free_names)}
+        for k in self._order:
+            link = self.links[k]
+            joint = link.joint
+            if joint.type is JointType.FIXED:
+                local[:, k] = link.T_parent_joint
+            elif joint.type is JointType.FREE:
+                local[:, k] = transforms.compose(link.T_parent_joint, free_poses[:, free[joint.name]])
+            else:
+                position = positions[:, scalar[joint.name]]
+                axis = np.array(joint.axis)
+                if joint.type is JointType.PRISMATIC:
+                    motion = transforms.from_translation(position[:, None] * axis)
+                else:
+                    motion = transforms.from_axis_angle(axis, position)
+                local[:, k] = transforms.compose(link.T_parent_joint, motion)
+            parent = self.parents[k]
+            world[:, k] = local[:, k] if parent < 0 else transforms.compose(world[:, parent], local[:, k])
+        return LinkPoses(self, local, world)
+
+    def _parents_first(self) -> list[int]:
+        order: list[int] = []
+        placed: set[int] = {-1}
+        waiting = list(range(len(self.links)))
+        while waiting:
+            ready = [k for k in waiting if int(self.parents[k]) in placed]
+            if not ready:
+                names = [self.link_names[k] for k in waiting]
+                raise InvalidValue("links", names, "these links are their own ancestors; the parents must form trees")
+            order.extend(ready)
+            placed.update(ready)
+            waiting = [k for k in waiting if k not in placed]
+        return order

@@ -1,0 +1,1 @@
+"""Log files as columns: bytes to arrays per topic, integrity and salvage; knows no scene."""

@@ -1,0 +1,1 @@
+"""Numbers: the jit policy, tolerances with reasons, rigid transforms in batch, closed-form integrals."""

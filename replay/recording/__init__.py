@@ -1,0 +1,1 @@
+"""Frame blocks to MCAP and rerun recordings, and recordings back to columns."""

@@ -1,0 +1,1 @@
+"""YAML text to a validated Scenario, and a Scenario to a Scene ready to simulate."""

@@ -1,0 +1,1 @@
+"""The distance sensor and the capacitive sensor."""
