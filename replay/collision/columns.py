@@ -1,0 +1,38 @@
+"""What the collision pipeline says of n frames, as columns."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
+
+
+class Level(enum.IntEnum):
+    """State of a pair of shapes in one frame, as the thesis shows it."""
+
+    CLEAR = 0
+    BOUNDS = 1  # only the bounding volumes meet
+    CONTACT = 2  # the shapes meet
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionColumns:
+    """Collision results of n frames and P pairs.
+
+    Attributes:
+        level: (n, P) uint8, see `Level`.
+        clearance: (n, P) [m], distance between the shapes; 0 in contact, NaN where not evaluated.
+        evaluated: (n, P) bool, whether `clearance` is a distance.
+        undecided: (n, P) bool, whether GJK reached its accuracy limit; the level is then contact, for safety.
+    """
+
+    level: Bytes
+    clearance: Floats
+    evaluated: Flags
+    undecided: Flags
