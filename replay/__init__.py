@@ -28,7 +28,7 @@ _PUBLIC = {
 }
 _ROOMS = ("errors", "numerics", "geometry", "kinematics", "collision", "sensing", "scenario", "recording", "simulation")
 
-__all__ = [*_PUBLIC, *_ROOMS]
+__all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:

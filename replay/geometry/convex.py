@@ -13,9 +13,9 @@ from replay.geometry.tree import Tree
 class ConvexSets(NamedTuple):
     """A body as the union of m convex sets (convex pieces, or the triangles of its surface), in its link's frame.
 
-    Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. `neighbors[neighbors_first[v]:neighbors_first[v + 1]]`
-    are the vertices adjacent to vertex v on its set's hull, as indices within the set; a set whose ranges are empty is
-    searched by brute force. `surface` says that the sets are the surface triangles of a watertight body, so that a body
+    Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. The vertices adjacent to vertex v on its set's hull
+    are `neighbors[neighbors_first[v]:neighbors_first[v + 1]]`, as indices within the set; a set whose ranges are empty
+    is searched by brute force. `surface` says that the sets are the surface triangles of a watertight body, so that a body
     wholly inside another needs a point-in-solid test beside them.
     """
 

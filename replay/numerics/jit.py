@@ -68,7 +68,7 @@ def cache_directory() -> Path:
 
 def _candidate_bases() -> list[Path]:
     given = os.environ.get("NUMBA_CACHE_DIR")
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache")
     identity = os.getuid() if hasattr(os, "getuid") else "user"
     return [
         *([Path(given) / "replay"] if given else []),

@@ -39,7 +39,7 @@ def compose(T_a_b: Array, T_b_c: Array) -> Array:
 
 
 def invert(T_a_b: Array) -> Array:
-    """Return T_b_a for rigid transforms of shape (..., 4, 4): the transposed rotation, and minus it times the origin."""
+    """Return T_b_a for rigid transforms of shape (..., 4, 4): rotation transposed, origin taken back."""
     result = np.zeros(T_a_b.shape)
     result[..., :3, :3] = np.swapaxes(T_a_b[..., :3, :3], -1, -2)
     for row in range(3):

@@ -30,6 +30,7 @@ class DistanceColumns:
         status: (n, D) uint8, see `Detection`.
         distance: (n, D) [m], NaN when nothing is detected.
         point: (n, D, 3) [m], closest point in world coordinates, NaN when nothing is detected.
+        point_sensor: (n, D, 3) [m], the same point in the sensor's own frame (apex at the origin, axis +z).
         normal: (n, D, 3), unit normal of the triangle in world coordinates, NaN when nothing is detected.
         shape: (n, D) int32, index into `Layout.shapes`, -1 when nothing is detected.
         triangle: (n, D) int32, index into the shape's triangles, -1 when nothing is detected.
@@ -39,6 +40,7 @@ class DistanceColumns:
     status: Bytes
     distance: Floats
     point: Floats
+    point_sensor: Floats
     normal: Floats
     shape: Integers
     triangle: Integers
