@@ -15,8 +15,8 @@ class ConvexSets(NamedTuple):
 
     Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. The vertices adjacent to vertex v on its set's hull
     are `neighbors[neighbors_first[v]:neighbors_first[v + 1]]`, as indices within the set; a set whose ranges are empty
-    is searched by brute force. `surface` says that the sets are the surface triangles of a watertight body, so that a body
-    wholly inside another needs a point-in-solid test beside them.
+    is searched by brute force. `surface` says that the sets are the surface triangles of a watertight body, so that a
+    body wholly inside another needs a point-in-solid test beside them.
     """
 
     vertices: NDArray[np.float64]  # (v, 3) [m]
