@@ -48,7 +48,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
 
 pictures: setup system  ## render the README's pictures from the recordings that `make run` left
-	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot docs/carm_head_contact.png --at 3
+	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
