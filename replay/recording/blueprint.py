@@ -48,13 +48,8 @@ def blueprint(plots: list[str], corners: Floats) -> Any:
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(255, 255, 255, 18)),
         eye_controls=rrb.EyeControls3D(position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)),
     )
-    charts = [
-        rrb.TimeSeriesView(
-            origin=f"/{name}", name=_TITLES[name], plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
-        )
-        for name in plots
-    ]
-    joints = rrb.TimeSeriesView(origin=f"/{JOINTS}", name="Joint positions [rad, m]")
+    charts = [_chart(name, _TITLES[name]) for name in plots]
+    joints = _chart(JOINTS, "Joint positions [rad, m]")
     below = rrb.Tabs(
         rrb.TextLogView(
             origin=f"/{EVENTS}",
@@ -71,4 +66,15 @@ def blueprint(plots: list[str], corners: Floats) -> Any:
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE),
         auto_views=False,
+    )
+
+
+def _chart(name: str, title: str) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TimeSeriesView(
+        origin=f"/{name}",
+        name=title,
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )

@@ -92,7 +92,7 @@ class RerunWriter:
         # The library opens the file that is already there anew, so that the name, its folder and its rights are proven.
         stream.save(self._file.part, default_blueprint=blueprint.blueprint(plots, corners))
         stream.send_recording_name(self._scene.name)
-        log_scene(stream, self._scene)
+        log_scene(stream, self._scene, self._members if block.collision is not None else ())
         return stream
 
     def _send(self, block: FrameBlock, rows: Flags, path: list[str], *columns: Any) -> None:
@@ -213,6 +213,7 @@ class RerunWriter:
             rr.TimeColumn("frame", sequence=[event.frame for event in events]),
         ]
         columns = rr.TextLog.columns(
-            text=[event.text for event in events], level=[_LOG_LEVELS[event.severity] for event in events]
+            text=[f"{event.time / 1e9:.3f} s  {event.text}" for event in events],
+            level=[_LOG_LEVELS[event.severity] for event in events],
         )
         self._stream.send_columns(blueprint.EVENTS, indexes=index, columns=columns, strict=True)
