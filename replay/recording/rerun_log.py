@@ -95,7 +95,10 @@ class RerunWriter:
         stream = rr.RecordingStream(APPLICATION)
         self._corners = extent(self._scene, block.link_poses[0])
         # The library opens the file that is already there anew, so that the name, its folder and its rights are proven.
-        stream.save(self._file.part)
+        try:
+            stream.save(self._file.part)
+        except RuntimeError as error:
+            raise WriteError(str(self._file.path), str(error)) from None
         stream.send_recording_name(self._scene.name)
         log_scene(stream, self._scene, self._members if block.collision is not None else ())
         return stream
@@ -186,7 +189,7 @@ class RerunWriter:
                 lengths = shown.astype(np.int64)  # no strip at all while nothing is seen
                 strips = rr.LineStrips3D.columns(strips=ends[rows & seen]).partition(lengths)
                 points = rr.Points3D.columns(positions=ends[rows & seen][:, 1]).partition(lengths)
-                self._send(block, rows, [blueprint.SCENE, "closest points", name], strips, points)
+                self._send(block, rows, [blueprint.SCENE, "closest_points", name], strips, points)
 
     def _capacitive(self, block: FrameBlock) -> None:
         for sensor, name in enumerate(self._layout.capacitive_sensors if block.capacitive is not None else ()):

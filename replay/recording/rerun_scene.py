@@ -33,13 +33,13 @@ def log_scene(stream: Any, scene: SceneView, colored: Collection[int]) -> None:
         _log_mesh(stream, body_path(scene, body), body.triangles, None if k in colored else body.color)
     for cone in scene.cones:
         lines = rr.LineStrips3D(cone_strips(cone), colors=CONE, radii=rr.Radius.ui_points(0.8))
-        stream.log([blueprint.SCENE, scene.links[cone.link], "distance sensors", cone.sensor], lines, static=True)
-        beam = [blueprint.SCENE, "closest points", cone.sensor]
+        stream.log([blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor], lines, static=True)
+        beam = [blueprint.SCENE, "closest_points", cone.sensor]
         stream.log(beam, _only(rr.LineStrips3D, colors=BEAM, radii=rr.Radius.ui_points(2.0)), static=True)
         stream.log(beam, _only(rr.Points3D, colors=BEAM, radii=rr.Radius.ui_points(5.0)), static=True)
     for plate in scene.plates:
         corners = plate_corners(plate)
-        path = [blueprint.SCENE, scene.links[plate.link], "capacitive sensors", plate.sensor, plate.name]
+        path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
         _log_mesh(stream, path, corners[[[0, 1, 2], [0, 2, 3]]], PLATE)
         outline = rr.LineStrips3D([corners[[0, 1, 2, 3, 0]]], colors=PLATE, radii=rr.Radius.ui_points(1.0))
         stream.log([*path, "outline"], outline, static=True)
