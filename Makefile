@@ -1,0 +1,64 @@
+# `make` lists what there is. Two commands do everything on a fresh machine with Python 3.11 and make: `make run`, `make test`.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RECORDINGS := recordings
+PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test lint format type schemas pictures soak clean system
+
+help:  ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## */\1\t/' | awk -F'\t' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+$(VENV)/.run: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps $(PHANTOMS)
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@touch $@
+
+setup: $(VENV)/.run  ## create .venv and install the package and the phantoms
+
+run: setup  ## run every scenario under scenarios/ and say where the recordings are
+	$(BIN)/replay run scenarios -o $(RECORDINGS) --overwrite
+	@echo
+	@echo "Recordings are in $(RECORDINGS)/<scenario>/. Look at one with:"
+	@echo "  $(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd"
+	@echo "  $(BIN)/replay info $(RECORDINGS)/carm_head_contact/carm_head_contact.mcap"
+
+test: $(VENV)/.test system lint type  ## install what is missing, then lint, types and all tests
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.test  ## check style and format
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/.test  ## put every file into the house's format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+type: $(VENV)/.test  ## check types
+	$(BIN)/mypy
+
+schemas: $(VENV)/.test  ## write the generated schemas again
+	$(BIN)/python -m replay.scenario.schema
+
+pictures: setup system  ## render the README's pictures from the recordings that `make run` left
+	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3
+
+soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
+	$(BIN)/python -m pytest -m soak
+
+system:  # a software Vulkan driver, so that the viewer can render without a GPU
+	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 || { \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    apt-get update -qq && apt-get install -qq -y --no-install-recommends mesa-vulkan-drivers >/dev/null; \
+	  else echo "no Vulkan driver found; screenshots need one (Debian: apt-get install mesa-vulkan-drivers)" >&2; fi; }
+
+clean:  ## remove the environment, recordings and caches
+	rm -rf $(VENV) $(RECORDINGS) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

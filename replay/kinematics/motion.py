@@ -1,0 +1,198 @@
+"""Scripted motion: what each joint does, and the joint states of all frames at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue, MotionLimitError
+from replay.kinematics.linkage import Joint, Linkage
+from replay.kinematics.profiles import Profile, Waypoint, from_pieces, through_waypoints, trapezoid, trapezoid_time
+from replay.numerics import transforms
+
+Array = NDArray[np.float64]
+
+LIMIT_SLACK = 1e-9  # relative: a move planned exactly at its limit may exceed it by rounding, never by more
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move of one or more joints from rest to rest, each by a trapezoidal velocity profile.
+
+    Attributes:
+        to: target position [rad or m] by joint name.
+        start: [s], or None: when the last earlier move of any of its joints has ended.
+        speed: fraction of the joints' velocity and acceleration limits that is used, in (0, 1].
+        synchronised: all joints arrive together with the slowest, each profile stretched in time.
+    """
+
+    to: Mapping[str, float]
+    start: float | None = None
+    speed: float = 1.0
+    synchronised: bool = True
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """Pose of a free joint's link, in the joint's frame, at one time [s]; xyz in m, a unit quaternion xyzw."""
+
+    time: float
+    xyz: tuple[float, float, float]
+    quat_xyzw: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Script:
+    """All scripted motion of a scenario; a joint that no entry names holds its initial position."""
+
+    points: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
+    moves: tuple[Move, ...] = ()
+    free: Mapping[str, tuple[Keyframe, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class JointStates:
+    """Joint states of n frames.
+
+    Attributes:
+        positions: (n, J) [rad or m], in the order of `Linkage.joint_names`.
+        velocities: (n, J) [per s].
+        free_poses: (n, K, 4, 4), T_joint_link of the free joints, in the order of `Linkage.free_names`.
+    """
+
+    positions: Array
+    velocities: Array
+    free_poses: Array
+
+
+def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
+    """Return the joint states at given times, after checking the whole script against every limit.
+
+    Args:
+        linkage: whose joints the script moves.
+        script: see `Script`; each joint may be moved by one kind of entry only.
+        seconds: (n,) [s], times of the frames.
+
+    Raises:
+        InvalidValue: a joint does not exist, is of the wrong type or scripted twice, or times are out of order.
+        MotionLimitError: the script breaks a position, velocity or acceleration limit between or at frames.
+
+    Accuracy: positions of moves and cubic points within 1e-14 of the range moved (tests/kinematics/test_motion.py).
+    Along straight lines through waypoints the velocity jumps at each waypoint, so acceleration is checked only where
+    it exists, inside the intervals.
+    """
+    profiles = joint_profiles(linkage, script)
+    n = len(seconds)
+    positions = np.empty((n, len(linkage.joints)))
+    velocities = np.empty((n, len(linkage.joints)))
+    for k, joint in enumerate(linkage.joints):
+        check_limits(joint, profiles[joint.name])
+        positions[:, k], velocities[:, k] = profiles[joint.name].sample(seconds)
+    free_poses = transforms.identity(n, len(linkage.free_joints))
+    for k, joint in enumerate(linkage.free_joints):
+        if joint.name in script.free:
+            free_poses[:, k] = _free_poses(joint.name, script.free[joint.name], seconds)
+    return JointStates(positions, velocities, free_poses)
+
+
+def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
+    """Return the profile of every scalar joint by name; see `sample` for what is raised."""
+    joints = {joint.name: joint for joint in linkage.joints}
+    moved = {name for move in script.moves for name in move.to}
+    for kind, names in (("points", set(script.points)), ("moves", moved)):
+        for name in sorted(names - joints.keys()):
+            raise InvalidValue(f"motion.{kind}", repr(name), f"names no such joint; joints are {sorted(joints)}")
+    for name in sorted(set(script.free) - set(linkage.free_names)):
+        raise InvalidValue(
+            "motion.free", repr(name), f"names no free joint; free joints are {list(linkage.free_names)}"
+        )
+    for name in sorted(moved & set(script.points)):
+        raise InvalidValue("motion.moves", repr(name), "is moved by motion.points as well; keep one of the two")
+    profiles = {name: from_pieces([], joint.initial, joint.initial) for name, joint in joints.items()}
+    profiles |= {name: through_waypoints(name, points) for name, points in script.points.items()}
+    return profiles | _planned(joints, script.moves)
+
+
+def check_limits(joint: Joint, profile: Profile) -> None:
+    """Raise MotionLimitError where the profile leaves the joint's limits, the worst place first."""
+    unit = joint.type.unit
+    limits = (
+        (0, "position", joint.lower, joint.upper, unit),
+        (1, "velocity", -joint.velocity, joint.velocity, f"{unit}/s"),
+        (2, "acceleration", -joint.acceleration, joint.acceleration, f"{unit}/s^2"),
+    )
+    for derivative, quantity, lower, upper, unit in limits:
+        if math.isinf(lower) and math.isinf(upper):
+            continue
+        candidates = profile.extremes(derivative)
+        if not candidates:
+            continue
+        size = max(abs(bound) for bound in (lower, upper) if math.isfinite(bound))
+        over_time, over = max(candidates, key=lambda item: item[1])
+        under_time, under = min(candidates, key=lambda item: item[1])
+        if over > upper + LIMIT_SLACK * size:
+            raise MotionLimitError(joint.name, over_time, quantity, over, upper, unit)
+        if under < lower - LIMIT_SLACK * size:
+            raise MotionLimitError(joint.name, under_time, quantity, under, lower, unit)
+
+
+def _planned(joints: Mapping[str, Joint], moves: tuple[Move, ...]) -> dict[str, Profile]:
+    """Plan the moves in the order they are written."""
+    pieces: dict[str, list[list[float]]] = {}
+    position: dict[str, float] = {}
+    free_from: dict[str, float] = {}
+    for number, move in enumerate(moves):
+        place = f"motion.moves[{number}]"
+        names = sorted(move.to)
+        if not names:
+            raise InvalidValue(f"{place}.to", "{}", "must name at least one joint")
+        if not 0.0 < move.speed <= 1.0:
+            raise InvalidValue(f"{place}.speed", move.speed, "must be above 0 and at most 1")
+        ready = max(free_from.get(name, 0.0) for name in names)
+        start = ready if move.start is None else move.start
+        for name in names:
+            joint = joints[name]
+            if start < free_from.get(name, 0.0):
+                rule = f"joint {name!r} is still moving until {free_from[name]:.6g} s; start then or later"
+                raise InvalidValue(f"{place}.start", f"{start:.6g} s", rule)
+            for limit in ("velocity", "acceleration"):
+                value = getattr(joint, limit)
+                if not (0.0 < value < math.inf):
+                    rule = f"a move needs a finite {limit} limit above 0 on joint {name!r}; give it one, or use points"
+                    raise InvalidValue(f"{place}.to.{name}", f"{limit} limit {value}", rule)
+        origins = {name: position.get(name, joints[name].initial) for name in names}
+        planned = {name: (joints[name].velocity * move.speed, joints[name].acceleration * move.speed) for name in names}
+        times = {name: trapezoid_time(abs(move.to[name] - origins[name]), *planned[name]) for name in names}
+        slowest = max(times.values())
+        for name in names:
+            velocity, acceleration = planned[name]
+            if move.synchronised and 0.0 < times[name] < slowest:
+                stretch = times[name] / slowest  # a profile stretched in time keeps its shape and its limits
+                velocity, acceleration = velocity * stretch, acceleration * stretch * stretch
+            pieces.setdefault(name, []).extend(trapezoid(start, origins[name], move.to[name], velocity, acceleration))
+            position[name] = move.to[name]
+            free_from[name] = start + (slowest if move.synchronised else times[name])
+    return {name: from_pieces(parts, joints[name].initial, position[name]) for name, parts in pieces.items()}
+
+
+def _free_poses(name: str, keyframes: tuple[Keyframe, ...], seconds: Array) -> Array:
+    """Poses (n, 4, 4) between key frames: position on a straight line, rotation by slerp, the end values hold."""
+    if not keyframes:
+        raise InvalidValue(f"motion.free.{name}", "[]", "must have at least one key frame")
+    times = np.array([key.time for key in keyframes])
+    if np.any(np.diff(times) <= 0.0):
+        raise InvalidValue(f"motion.free.{name}", times.tolist(), "times must strictly increase")
+    xyz = np.array([key.xyz for key in keyframes])
+    quat = np.array([key.quat_xyzw for key in keyframes])
+    quat = quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None]
+    begin = np.clip(np.searchsorted(times, seconds, side="right") - 1, 0, len(times) - 1)
+    end = np.minimum(begin + 1, len(times) - 1)
+    span = np.where(end > begin, times[end] - times[begin], 1.0)
+    fraction = np.clip((seconds - times[begin]) / span, 0.0, 1.0)
+    poses = transforms.from_quaternion(transforms.slerp(quat[begin], quat[end], fraction))
+    poses[:, :3, 3] = xyz[begin] + fraction[:, None] * (xyz[end] - xyz[begin])
+    return poses

@@ -1,0 +1,177 @@
+"""One joint's motion as a piecewise polynomial in time: through waypoints, or by trapezoidal velocity profiles.
+
+Every kind of scripted motion ends up here, so that sampling and checking limits are written once. A piece holds six
+coefficients in its own local time tau = t - start: x = c0 + c1 tau + ... + c5 tau^5.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """What a joint passes at one time, with the meaning of a point of a ROS JointTrajectory.
+
+    Attributes:
+        time: [s] from the scenario's start.
+        position: [rad or m].
+        velocity: [per s], or None.
+        acceleration: [per s^2], or None; needs a velocity.
+    """
+
+    time: float
+    position: float
+    velocity: float | None = None
+    acceleration: float | None = None
+
+    @property
+    def order(self) -> int:
+        """0 with a position alone, 1 with a velocity, 2 with an acceleration as well."""
+        return (self.velocity is not None) + (self.velocity is not None and self.acceleration is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A joint's position over time; outside its pieces the nearest end's value holds.
+
+    Attributes:
+        start, end: (m,) [s], times of the pieces, increasing; between two pieces the earlier one's end value holds.
+        coefficients: (m, 6), see the module's text.
+        before, after: [rad or m], position before the first and after the last piece.
+    """
+
+    start: Array
+    end: Array
+    coefficients: Array
+    before: float
+    after: float
+
+    def sample(self, seconds: Array) -> tuple[Array, Array]:
+        """Return position (n,) and velocity (n,) at times (n,) [s]."""
+        if not len(self.start):
+            return np.full(len(seconds), self.after), np.zeros(len(seconds))
+        piece = np.searchsorted(self.start, seconds, side="right") - 1
+        inside = np.maximum(piece, 0)
+        c = self.coefficients[inside]
+        tau = np.minimum(seconds, self.end[inside]) - self.start[inside]
+        position = c[:, 5]
+        velocity = 5.0 * c[:, 5]
+        for power in range(4, -1, -1):
+            position = position * tau + c[:, power]
+            if power:
+                velocity = velocity * tau + power * c[:, power]
+        resting = (piece < 0) | (seconds > self.end[inside])
+        position = np.where(piece < 0, self.before, np.where(seconds >= self.end[-1], self.after, position))
+        return position, np.where(resting, 0.0, velocity)
+
+    def extremes(self, derivative: int) -> list[tuple[float, float]]:
+        """Return candidates (time, value) for the extremes of a derivative: piece ends and inner stationary points."""
+        if not len(self.start):
+            return [(0.0, self.after if derivative == 0 else 0.0)]
+        found = [(float(self.start[0]), self.before), (float(self.end[-1]), self.after)] if derivative == 0 else []
+        for start, end, coefficients in zip(self.start, self.end, self.coefficients, strict=True):
+            polynomial = np.polynomial.Polynomial(coefficients).deriv(derivative)
+            length = float(end - start)
+            inner = [r.real for r in polynomial.deriv().trim().roots() if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
+            times = [0.0, length, *(float(t) for t in inner if 0.0 < t < length)]
+            found.extend((float(start) + tau, float(polynomial(tau))) for tau in times)
+        return found
+
+
+def through_waypoints(name: str, waypoints: Sequence[Waypoint]) -> Profile:
+    """Return the profile through waypoints: linear, cubic or quintic in each interval.
+
+    An interval takes the highest order that both its ends offer: positions alone give a line, velocities the cubic
+    Hermite polynomial, accelerations as well the quintic one (as ROS's joint_trajectory_controller does).
+
+    Raises:
+        InvalidValue: there are no waypoints, or their times do not strictly increase.
+    """
+    if not waypoints:
+        raise InvalidValue(f"motion.points.{name}", "[]", "must have at least one point")
+    times = [point.time for point in waypoints]
+    for k, (earlier, later) in enumerate(itertools.pairwise(times)):
+        if not later > earlier:
+            raise InvalidValue(
+                f"motion.points.{name}[{k + 1}].time", later, f"must be above the one before, {earlier} s"
+            )
+    pieces = [_hermite(a, b) for a, b in itertools.pairwise(waypoints)]
+    return Profile(
+        start=np.array(times[:-1]),
+        end=np.array(times[1:]),
+        coefficients=np.array(pieces).reshape(-1, 6),
+        before=waypoints[0].position,
+        after=waypoints[-1].position,
+    )
+
+
+def _hermite(a: Waypoint, b: Waypoint) -> list[float]:
+    """Coefficients between two waypoints, in local time; h is the interval, d the change of position."""
+    h = b.time - a.time
+    d = b.position - a.position
+    order = min(a.order, b.order)
+    if order == 0:
+        return [a.position, d / h, 0.0, 0.0, 0.0, 0.0]
+    assert a.velocity is not None and b.velocity is not None
+    v, w = a.velocity * h, b.velocity * h
+    if order == 1:
+        return [a.position, a.velocity, (3.0 * d - 2.0 * v - w) / h**2, (v + w - 2.0 * d) / h**3, 0.0, 0.0]
+    assert a.acceleration is not None and b.acceleration is not None
+    p, q = a.acceleration * h * h, b.acceleration * h * h
+    return [
+        a.position,
+        a.velocity,
+        0.5 * a.acceleration,
+        (10.0 * d - 6.0 * v - 4.0 * w - 1.5 * p + 0.5 * q) / h**3,
+        (-15.0 * d + 8.0 * v + 7.0 * w + 1.5 * p - q) / h**4,
+        (6.0 * d - 3.0 * v - 3.0 * w - 0.5 * p + 0.5 * q) / h**5,
+    ]
+
+
+def trapezoid_time(distance: float, velocity: float, acceleration: float) -> float:
+    """Return the time [s] that a trapezoidal (short ways: triangular) velocity profile takes for a distance >= 0."""
+    if distance * acceleration <= velocity * velocity:
+        return 2.0 * math.sqrt(distance / acceleration)
+    return distance / velocity + velocity / acceleration
+
+
+def trapezoid(start: float, origin: float, target: float, velocity: float, acceleration: float) -> list[list[float]]:
+    """Return the pieces [start, end, c0..c5] of one move from rest to rest under its limits.
+
+    Args:
+        start: [s], when the move begins.
+        origin, target: [rad or m].
+        velocity, acceleration: limits, both > 0.
+    """
+    distance = abs(target - origin)
+    if distance == 0.0:
+        return []
+    sign = math.copysign(1.0, target - origin)
+    total = trapezoid_time(distance, velocity, acceleration)
+    ramp = min(velocity / acceleration, 0.5 * total)
+    peak = acceleration * ramp
+    rise = 0.5 * acceleration * ramp * ramp
+    a, v = sign * acceleration, sign * peak
+    pieces = [[start, start + ramp, origin, 0.0, 0.5 * a, 0.0, 0.0, 0.0]]
+    cruise = total - 2.0 * ramp
+    if cruise > 0.0:
+        pieces.append([start + ramp, start + ramp + cruise, origin + sign * rise, v, 0.0, 0.0, 0.0, 0.0])
+    pieces.append([start + total - ramp, start + total, target - sign * rise, v, -0.5 * a, 0.0, 0.0, 0.0])
+    return pieces
+
+
+def from_pieces(pieces: Sequence[Sequence[float]], before: float, after: float) -> Profile:
+    """Return the profile made of pieces [start, end, c0..c5] in order of time."""
+    table = np.array(pieces, dtype=np.float64).reshape(-1, 8)
+    return Profile(start=table[:, 0], end=table[:, 1], coefficients=table[:, 2:], before=before, after=after)

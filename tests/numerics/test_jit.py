@@ -1,0 +1,72 @@
+"""The kernel cache: an edited callee is never served stale, and every kind of install finds a place for it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import replay
+
+CALLEE = "from replay.numerics.jit import kernel\n\n\n@kernel\ndef inner(x):\n    return x + {}\n"
+CALLER = (
+    "from replay.numerics.jit import kernel\nfrom replay.geometry.callee import inner\n\n\n"
+    "@kernel\ndef outer(x):\n    return 10.0 * inner(x)\n"
+)
+PROBE = "from replay.collision.caller import outer; from replay.numerics.jit import cache_directory as c;"
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the jit policy in a package of its own, with a kernel that calls a kernel in another room."""
+    root = tmp_path / "site" / "replay"
+    for room in ("numerics", "geometry", "collision"):
+        (root / room).mkdir(parents=True)
+        (root / room / "__init__.py").write_text("")
+    (root / "__init__.py").write_text("")
+    shutil.copy(Path(replay.__file__).parent / "numerics" / "jit.py", root / "numerics" / "jit.py")
+    (root / "geometry" / "callee.py").write_text(CALLEE.format("1.0"))
+    (root / "collision" / "caller.py").write_text(CALLER)
+    return root
+
+
+def run(package: Path, code: str, **environment: str) -> str:
+    env = {**os.environ, "PYTHONPATH": str(package.parent), **environment}
+    command = [sys.executable, "-c", PROBE + code]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=package.parent, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_an_edited_callee_in_another_module_is_never_served_stale(package, tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run(package, "print(outer(1.0))", **cache) == "20.0"
+    callee = package / "geometry" / "callee.py"
+    stamp = callee.stat()
+    callee.write_text(CALLEE.format("2.0"))
+    os.utime(callee, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # same size, same time: only the content differs
+    assert run(package, "print(outer(1.0))", **cache) == "30.0"
+
+
+def test_compiled_code_is_reused_while_nothing_changes(package, tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    hits = "outer(1.0); print(sum(outer.stats.cache_hits.values()))"
+    assert run(package, hits, **cache) == "0"
+    assert run(package, hits, **cache) == "1"
+
+
+def test_numba_cache_dir_is_honoured(package, tmp_path):
+    chosen = tmp_path / "chosen"
+    assert run(package, "outer(1.0); print(c())", NUMBA_CACHE_DIR=str(chosen)).startswith(str(chosen))
+    assert list(chosen.rglob("*.nbi"))
+
+
+def test_an_install_that_cannot_be_written_uses_the_users_cache_folder(package, tmp_path):
+    blocked = package / "numerics" / "__pycache__"
+    blocked.write_text("a file where the folder would be: not even root can create a folder below it")
+    home = {"XDG_CACHE_HOME": str(tmp_path / "xdg"), "NUMBA_CACHE_DIR": "", "PYTHONDONTWRITEBYTECODE": "1"}
+    assert run(package, "outer(1.0); print(c())", **home).startswith(str(tmp_path / "xdg"))
+    nowhere = {**home, "XDG_CACHE_HOME": str(blocked), "TMPDIR": str(tmp_path)}
+    assert run(package, "outer(1.0); print(c())", **nowhere).startswith(str(tmp_path))

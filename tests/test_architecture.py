@@ -1,0 +1,74 @@
+"""The rooms of the house and the direction of imports between them."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import replay
+
+PACKAGE = Path(replay.__file__).parent
+ROOMS = (
+    "errors",
+    "numerics",
+    "geometry",
+    "logs",
+    "kinematics",
+    "collision",
+    "sensing",
+    "scenario",
+    "simulation",
+    "recording",
+    "comparison",
+    "batch",
+    "bench",
+    "cli",
+)
+ENTRANCES = ("__init__", "__main__")
+STRANGERS = {("collision", "sensing"), ("sensing", "collision"), ("logs", "scenario"), ("kinematics", "logs")}
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imported_rooms(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        modules: list[str] = []
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            modules = [node.module or ""]
+            if node.module == "replay":
+                modules = [f"replay.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Import):
+            modules = [alias.name for alias in node.names]
+        found |= {name.split(".")[1] for name in modules if name.startswith("replay.")}
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_room_imports_only_from_rooms_above_it(path):
+    room = room_of(path)
+    if room in ENTRANCES:
+        return
+    assert room in ROOMS, f"{path} stands in no room"
+    for other in imported_rooms(path) & set(ROOMS):
+        assert ROOMS.index(other) <= ROOMS.index(room), f"{path}: {room} must not import {other}"
+        assert (room, other) not in STRANGERS, f"{path}: {room} and {other} do not know each other"
+
+
+def test_import_replay_loads_nothing_heavy():
+    heavy = ("numpy", "numba", "rerun", "trimesh", "scipy", "matplotlib", "pydantic")
+    code = f"import sys, replay; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_resolves():
+    for name in replay.__all__:
+        assert getattr(replay, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = replay.nothing
