@@ -257,7 +257,9 @@ class _Builder:
             if not isinstance(name, str):
                 self.report(event, f"key {key.shown()} is not text; keys are text, write it in quotes")
             elif name == "<<" and key.text == "<<":
-                self.report(event, "merge keys (<<) are not YAML 1.2; write the keys out, or use an alias for the whole")
+                self.report(
+                    event, "merge keys (<<) are not YAML 1.2; write the keys out, or use an alias for the whole"
+                )
             elif name in node.keys:
                 self.report(event, f"{name}: the key is written twice; the first is at {node.keys[name]}")
             else:
