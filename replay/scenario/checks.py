@@ -33,7 +33,7 @@ def check(names: Names) -> Iterator[Finding]:
 
 def _links(names: Names) -> Iterator[Finding]:
     if not names.parents:
-        yield ("links",), "links must hold at least one link"
+        yield ("links",), "must hold at least one link"
     for link, parent in names.parents.items():
         if parent is not None and parent not in names.parents:
             yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"

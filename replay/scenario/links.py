@@ -63,7 +63,7 @@ class Revolute(JointPart):
 
     @model_validator(mode="after")
     def _initial_within_limits(self) -> Self:
-        _check_limits(self.lower, self.upper, self.initial, "rad")
+        _check_limits(self, "rad")
         return self
 
 
@@ -100,16 +100,17 @@ class Prismatic(JointPart):
 
     @model_validator(mode="after")
     def _initial_within_limits(self) -> Self:
-        _check_limits(self.lower, self.upper, self.initial, "m")
+        _check_limits(self, "m")
         return self
 
 
-def _check_limits(lower: float, upper: float, initial: float, unit: str) -> None:
-    if lower > upper:
-        raise rejected(f"must not be above the upper limit {upper:.6g} {unit}", at=("lower",))
-    if not lower <= initial <= upper:
-        between = f"between the limits {lower:.6g} {unit} and {upper:.6g} {unit}"
-        raise rejected(f"= {initial:.6g} {unit} must be {between}", at=("initial",))
+def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
+    if joint.lower > joint.upper:
+        raise rejected(f"must not be above the upper limit {joint.upper:.6g} {unit}", at=("lower",))
+    if not joint.lower <= joint.initial <= joint.upper:
+        given = "" if "initial" in joint.model_fields_set else "(0 when left out) "
+        between = f"between the limits {joint.lower:.6g} {unit} and {joint.upper:.6g} {unit}"
+        raise rejected(f"{given}must be {between}", at=("initial",))
 
 
 Joint = Annotated[Fixed | Revolute | Continuous | Prismatic | Free, Field(discriminator="type")]

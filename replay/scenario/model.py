@@ -46,7 +46,7 @@ class Scenario(Fragment):
     """A scene, its scripted motion, its sensors, and what is computed of them."""
 
     version: Literal[1]
-    """Version of this language."""
+    """1, the version of this language."""
     name: Title
     """Names the recording."""
     description: Text = ""

@@ -80,7 +80,8 @@ def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
         case "int_type":
             return "must be a whole number"
         case "dict_type" | "model_type" | "model_attributes_type" | "mapping_type":
-            return "must be a mapping (key: value)"
+            empty = node is not None and node.value is None
+            return "must be a mapping (key: value)" + ("; write {} for an empty one" if empty else "")
         case "list_type" | "tuple_type":
             return "must be a list"
         case "literal_error":
@@ -94,7 +95,7 @@ def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
         case "too_short":
             return f"must have at least {context['min_length']} entr{'y' if context['min_length'] == 1 else 'ies'}"
         case "too_long":
-            return f"has {context['actual_length']} entries; it needs {context['max_length']}"
+            return f"needs {context['max_length']} entries, not {context['actual_length']}"
         case "greater_than_equal":
             return f"must be at least {context['ge']}"
         case "less_than_equal":
@@ -119,7 +120,7 @@ def _missing(found: _Location, last: str | int, root: Node) -> Problem:
     if isinstance(last, int):
         node = find(root, path)
         count = len(node.sequence) if node is not None else 0
-        return locate(root, path).problem(f"{dotted(path)} has {count} entries; it needs {found.length}")
+        return locate(root, path).problem(f"{dotted(path)} needs {found.length} entries, not {count}")
     fields = {} if found.owner is None else found.owner.model_fields
     about = fields[last].description if last in fields else None
     hint = f"; {about.rstrip('.')}" if about else ""

@@ -64,7 +64,9 @@ class Curved(ShapePart):
     def _sensible_chord_error(self) -> Self:
         if not FINEST_CHORD * self.radius <= self.chord_error < self.radius:
             low, high = FINEST_CHORD * self.radius, self.radius
-            raise rejected(f"[m] must be at least {low:.6g} m and below the radius {high:.6g} m", at=("chord_error",))
+            given = "" if "chord_error" in self.model_fields_set else f"({self.chord_error:.6g} m when left out) "
+            rule = f"{given}must be at least {low:.6g} m and below the radius {high:.6g} m"
+            raise rejected(rule, at=("chord_error",))
         return self
 
 

@@ -233,14 +233,17 @@ class AnyQuantity:
         return json_schema(self.name, {"type": "number"}, self.dimensions)
 
 
+QUANTITY_KEY: Final = "x-quantity"
+"""Names a quantity's type in generated JSON Schemas, until each type is defined once."""
+
+
 def json_schema(name: str, number: dict[str, Any], dimensions: tuple[Dimension, ...]) -> dict[str, Any]:
-    """Return the JSON Schema of a quantity: a number, or a text with one of the units; `title` names the type."""
+    """Return the JSON Schema of a quantity: a number, or a text with one of the units."""
     units = [unit for dimension in dimensions for unit in dimension.units]
     if not units:
-        return {"title": name, **number}
-    pattern = rf"^\s*{_DECIMAL}(/[0-9]+)?\s*({'|'.join(re.escape(unit) for unit in units)})\s*$"
-    described = " or ".join(f"{d.name} [{d.si}], or text such as '{d.example}'" for d in dimensions)
-    return {"title": name, "description": described, "anyOf": [number, {"type": "string", "pattern": pattern}]}
+        return {QUANTITY_KEY: name, **number}
+    pattern = rf"^\s*{_DECIMAL}(/[0-9]+)?\s*({'|'.join(unit.replace('^', chr(92) + '^') for unit in units)})\s*$"
+    return {QUANTITY_KEY: name, "anyOf": [number, {"type": "string", "pattern": pattern}]}
 
 
 FULL_TURN: Final = 2.0 * math.pi
