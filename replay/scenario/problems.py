@@ -39,10 +39,17 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
     """
     problems: list[Problem] = []
     for detail in error.errors(include_url=False, include_input=False):
+        if detail["type"] == "too_short" and _long_enough(detail, root, model):
+            continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)
         if str(problem) not in {str(other) for other in problems}:
             problems.append(problem)
     return problems
+
+
+def _long_enough(detail: Any, root: Node, model: type[BaseModel]) -> bool:
+    node = find(root, _follow(detail["loc"], root, model).path)
+    return node is not None and len(node.sequence or node.mapping) >= detail["ctx"]["min_length"]
 
 
 def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:

@@ -62,11 +62,10 @@ class Curved(ShapePart):
 
     @model_validator(mode="after")
     def _sensible_chord_error(self) -> Self:
-        if not FINEST_CHORD * self.radius <= self.chord_error < self.radius:
-            low, high = FINEST_CHORD * self.radius, self.radius
+        finest = FINEST_CHORD * self.radius
+        if self.chord_error < finest:
             given = "" if "chord_error" in self.model_fields_set else f"({self.chord_error:.6g} m when left out) "
-            rule = f"{given}must be at least {low:.6g} m and below the radius {high:.6g} m"
-            raise rejected(rule, at=("chord_error",))
+            raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
         return self
 
 
