@@ -18,6 +18,8 @@ from replay.scenario.units import (
     Dimensioned,
 )
 
+WORLD = "world"
+
 Finding = tuple[Path, str]
 """The path of a value, and the rule it breaks."""
 
@@ -35,6 +37,8 @@ def _links(names: Names) -> Iterator[Finding]:
     if not names.parents:
         yield ("links",), "must hold at least one link"
     for link, parent in names.parents.items():
+        if link == WORLD:
+            yield ("links", link), "must have another name: 'world' is the frame that all links stand in"
         if parent is not None and parent not in names.parents:
             yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"
     in_cycle: set[str] = set()

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ValidationError
 
 from replay.errors import Problem
 from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
+from replay.scenario.node import Node
 from replay.scenario.shapes import Color
 from replay.scenario.source import dotted, find, locate, problem_at
-from replay.scenario.yaml_text import Node
 
 Path = tuple[str | int, ...]
 

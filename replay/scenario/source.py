@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from replay.errors import Problem
-from replay.scenario.yaml_text import Node, Place
+from replay.scenario.node import Node, Place
 
 PACKAGE: Final = "package://"
 MAX_FILE_BYTES: Final = 1 << 30
