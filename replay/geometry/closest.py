@@ -61,9 +61,15 @@ def squared_distance_to_triangle(point: Array, triangle: Array) -> float:
 @kernel
 def distance_to_surface(point: Array, triangles: Array, tree: Tree) -> float:
     """Return the distance [m] from a point (3,) to triangles (n, 3, 3) under their tree."""
+    return nearest_triangle(point, triangles, tree)[0]
+
+
+@kernel
+def nearest_triangle(point: Array, triangles: Array, tree: Tree) -> tuple[float, int]:
+    """Return (distance [m], index) of the triangle of (n, 3, 3) nearest to a point (3,), found through their tree."""
     waiting = np.empty(MAX_DEPTH, np.int64)
     bounds = np.empty(MAX_DEPTH)
-    best = np.inf
+    best, nearest = np.inf, -1
     waiting[0], bounds[0] = 0, 0.0
     size = 1
     while size > 0:
@@ -73,7 +79,9 @@ def distance_to_surface(point: Array, triangles: Array, tree: Tree) -> float:
             continue
         if tree.second[node] < 0:
             for k in range(tree.begin[node], tree.end[node]):
-                best = min(best, squared_distance_to_triangle(point, triangles[tree.order[k]]))
+                square = squared_distance_to_triangle(point, triangles[tree.order[k]])
+                if square < best:
+                    best, nearest = square, tree.order[k]
             continue
         near, far = node + 1, tree.second[node]
         to_near = squared_distance_to_box(point, tree.lower[near], tree.upper[near])
@@ -83,4 +91,4 @@ def distance_to_surface(point: Array, triangles: Array, tree: Tree) -> float:
         waiting[size], bounds[size] = far, to_far
         waiting[size + 1], bounds[size + 1] = near, to_near
         size += 2
-    return np.sqrt(best)  # type: ignore[no-any-return]
+    return np.sqrt(best), nearest
