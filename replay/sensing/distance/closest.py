@@ -48,7 +48,7 @@ def closest_in_cone(
         range: largest distance that is sensed [m], 0 to inf.
 
     Returns:
-        `ConeHit`; an apex on a triangle (within 12 ulps of its farthest corner, seen from the apex) reads 0.
+        `ConeHit`; an apex on a triangle (within 40 ulps of its farthest corner) reads 0.
 
     Raises:
         InvalidValue: wrong shape, a value that is not finite, a zero axis, an aperture or range out of bounds.
@@ -66,7 +66,8 @@ def closest_in_cone(
     check_range("range", range)
 
     # A power of two brings every size near 1 without rounding, so that no product under- or overflows.
-    relative = corners - origin
+    with np.errstate(over="ignore"):
+        relative = corners - origin
     largest = float(np.max(np.abs(relative), initial=0.0))
     if not math.isfinite(largest):
         raise InvalidValue("triangles", "coordinates", "must be small enough that differences to the apex are finite")

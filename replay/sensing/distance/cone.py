@@ -1,7 +1,7 @@
 """The closest point of one triangle to the apex of a cone, inside the cone: exact, by cases.
 
-The apex is the origin, v the unit axis, h = aperture / 2 in (0, pi], a b c the corners. The sensed volume V holds x when
-angle(x, v) <= h. One candidate of the triangle's plane and three of its edges are enough:
+The apex is the origin, v the unit axis, h = aperture / 2 in (0, pi], a b c the corners. The sensed volume V holds x
+when angle(x, v) <= h. One candidate of the triangle's plane and three of its edges are enough.
 
 Plane. n is the unit normal with delta = n · x > 0 on the triangle, phi = angle(n, v), psi = phi - h. A point of the
 plane at the angle beta from n is delta / cos(beta) away, so the closest point of plane ∩ V has the smallest beta that V
@@ -12,21 +12,21 @@ is the complement of a convex cone, and a second local minimum on the conic does
 is farther from R than its radius of curvature). If it does not, the answer lies on an edge. The axis is never
 intersected with the plane, and one sign decides between foot and border, so rounding cannot lose both.
 
-Edge a b. m is the unit normal of the plane through apex and edge, mu = v · m, s w = v - mu m, k = m × w. In the basis (w, k)
-the cone is the sector between the rays
+Edge a b. m is the unit normal of the plane through apex and edge, mu = v · m, s k = m × v, w = k × m. In the basis
+(w, k) the cone is the sector between the rays
   r∓ = (cos h, ∓D) / s,   D^2 = (sin h - mu)(sin h + mu) = (s - cos h)(s + cos h)
 (two forms of the same number: the first is accurate for narrow cones, the second for wide ones) and the edge turns
-from a to b counter-clockwise by less than 180 deg. So it can only enter through r- and leave through r+, and it crosses a
-ray exactly when a lies before it and b after it: signs of 2x2 cross products, no quadratic, no root on the mirrored
-cone. The crossing is |a × b| / (r × e) along the ray, e = b - a: a point of the border by construction [case 3]. The
-foot of the apex on the edge, e × (a × b) / |e|^2, [case 4] and the corners [case 5] compete when they lie in the sector.
-Above 90 deg the sector is that of the complement (axis -v, half angle 180 deg - h), and its outside is what counts. An
+from a to b counter-clockwise by less than 180 deg. So it can only enter through r- and leave through r+, and it crosses
+a ray exactly when a lies before it and b after it: signs of 2x2 cross products, no quadratic, no root on the mirrored
+cone. The crossing is |a × b| / (r × e) along the ray, e = b - a: a point of the border by construction (case 3). The
+foot of the apex on the edge, e × (a × b) / |e|^2 (case 4), and the corners (case 5) compete when they lie in the
+sector. Above 90 deg the sector is that of the complement (axis -v, half angle 180 deg - h), and its outside counts. An
 edge on a line through the apex has no such plane: its corners compete by membership,
   |v × x| cos h <= (v · x) sin h.
 
-Slivers need no case of their own: their normal is formed in twice the working precision.
-Nearness to the apex below `TOUCH` of the largest corner is rounding of the corners themselves: the apex is on the triangle.
-Source: J. Huijgens, TU Eindhoven 2015, chapter on the distance sensor, for the five cases; the forms used are derived here.
+Slivers need no case of their own: their normal is formed in twice the working precision. Nearness to the apex below
+`TOUCH` of the farthest corner is rounding of the corners themselves: the apex is on the triangle.
+Source: J. Huijgens, TU Eindhoven 2015, for the five cases; the forms used are derived here.
 """
 
 from __future__ import annotations
@@ -51,8 +51,11 @@ from replay.sensing.distance.vectors import (
 
 EPSILON = float(np.finfo(np.float64).eps)
 
-TOUCH = 12.0 * EPSILON
-"""An apex nearer to the triangle than this part of its farthest corner lies on it: corners and apex are rounded."""
+TOUCH = 40.0 * EPSILON
+"""An apex nearer to the triangle than this part of its farthest corner lies on it.
+
+Corners are rounded, often in a frame where they are larger than seen from the apex: 5 ulps occur in the hard cases.
+"""
 
 _LATERAL = 4.0 * EPSILON
 """A plane candidate this far outside an edge, as part of the farthest corner, is taken as on it: it was rounded."""
@@ -151,8 +154,8 @@ def closest_on_edge(
     v = (flip * cone.vx, flip * cone.vy, flip * cone.vz)
     m = scaled(1.0 / doubled, area)
     mu = dot(v, m)
-    w = combined(1.0, v, -mu, m)
-    s = norm(w)
+    k = accurate_cross(m, v)
+    s = norm(k)
     if cos_half > cone.sin_half:
         opening = (cone.sin_half - mu) * (cone.sin_half + mu)
     else:
@@ -165,8 +168,8 @@ def closest_on_edge(
         if length_b < length_a:
             return length_b, b, CORNER
         return length_a, a, CORNER
-    w = scaled(1.0 / s, w)
-    k = cross(m, w)
+    k = scaled(1.0 / s, k)
+    w = cross(k, m)
     D = math.sqrt(opening)
 
     # Where foot and corners lie in the sector: before r- (entry > 0), after r+ (exit < 0)

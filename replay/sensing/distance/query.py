@@ -3,10 +3,10 @@
 Work is skipped only on lower bounds that hold after rounding, and among equal distances the lowest triangle index wins,
 so the answer is the same bit for bit with or without the tree and whatever bound the search starts from.
 
-Bounds. The box of a node lies in the ball around its centre C with radius rho = |half widths|. With theta the angle of C to
-the axis, f(C) = |C| sin(h - theta) is positive inside the cone, and moves by no more than the point does: no point of the
-ball is in the cone when f(C) < -rho. Behind a cone of less than 180 deg the apex is nearest: none when theta > h + 90 deg and
-|C| > rho. And no point of the box is nearer than the box itself.
+Bounds. The box of a node lies in the ball around its centre C with radius rho = |half widths|. With theta the angle of
+C to the axis, f(C) = |C| sin(h - theta) is positive inside the cone, and changes by no more than the way a point moves:
+no point of the ball is in the cone when f(C) < -rho. Behind a cone of at most 180 deg the apex is nearest: none when
+theta > h + 90 deg and |C| > rho. And no point of the box is nearer than the box itself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from replay.sensing.distance.vectors import Vector, cross, dot, norm
 
 Array = NDArray[np.float64]
 
-SLACK = 64.0 * EPSILON
+SLACK = 128.0 * EPSILON
 """Rounding of any distance in a query, as part of the farthest coordinate seen from the apex."""
 
 SCAN_LIMIT = 12
