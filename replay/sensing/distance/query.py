@@ -1,7 +1,8 @@
 """The closest triangle of a mesh in a cone: a scan, or a walk of the triangle tree that skips what cannot win.
 
 Work is skipped only on lower bounds that hold after rounding, and among equal distances the lowest triangle index wins,
-so the answer is the same bit for bit with or without the tree and whatever bound the search starts from.
+so the answer is the same bit for bit with or without the tree and whatever bound the search starts from. Meshes that
+fit in one leaf are a scan as they are; from 8 triangles on the walk was measured to win.
 
 Bounds. The box of a node lies in the ball around its centre C with radius rho = |half widths|. With theta the angle of
 C to the axis, f(C) = |C| sin(h - theta) is positive inside the cone, and changes by no more than the way a point moves:
@@ -23,11 +24,10 @@ from replay.sensing.distance.vectors import Vector, cross, dot, norm
 
 Array = NDArray[np.float64]
 
+LARGEST = float(np.finfo(np.float64).max)
+
 SLACK = 128.0 * EPSILON
 """Rounding of any distance in a query, as part of the farthest coordinate seen from the apex."""
-
-SCAN_LIMIT = 12
-"""Meshes of at most this many triangles are scanned (measured: a walk of their tree does not pay)."""
 
 
 @kernel
@@ -106,10 +106,10 @@ def closest_in_tree(
     """
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
     slack = query_slack(tree, apex)
-    limit = reach
+    limit = min(reach, LARGEST)  # so that an infinite bound is always above it
     if start >= 0:
         distance, x, which = on_triangle(triangles, start, apex, cone)
-        if distance <= reach:
+        if distance <= limit:
             best, point, triangle, case = distance, x, start, which
             limit = best
     top = 0
@@ -128,9 +128,7 @@ def closest_in_tree(
                     if k == start:
                         continue
                     distance, x, which = on_triangle(triangles, k, apex, cone)
-                    if distance < best or (distance == best and k < triangle):
-                        if distance > reach or which == 0:
-                            continue
+                    if distance < limit or (distance == limit and (triangle < 0 or k < triangle)):
                         best, point, triangle, case = distance, x, k, which
                         limit = best
                 break

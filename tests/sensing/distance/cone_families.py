@@ -78,7 +78,7 @@ def wide(rng, n):
 
 
 def wide_edge_plane(rng, n):
-    """Nearly a half space, the plane of apex and edge nearly orthogonal to the axis; the search sees only 1e-16 / gap."""
+    """Near a half space, the plane of apex and edge nearly orthogonal to the axis (the search errs by 1e-16 / gap)."""
     triangles, _, _ = _generic(rng, n)
     gap = 10.0 ** rng.uniform(-4.0, -1.0, size=n)
     normals = _towards(np.cross(triangles[:, 0], triangles[:, 1]))
