@@ -8,12 +8,13 @@ z = 0 and by the four border planes into at most 9 convex pieces a side, each is
 
 u, v and z being linear on a piece. All terms are positive. What makes it exact to rounding:
 
-- A corner of a piece keeps its two barycentric coordinates in the triangle, from which shares of the area are taken
-  (no area is lost, however small the triangle is against its coordinates), its z, and its four distances beyond the
-  borders. Each is a convex combination of the triangle's corners, which are exact differences; a distance that has just
-  been cut is exactly 0. So every coordinate of a piece is accurate to its own size, and a piece lies in one octant,
-  which is what the closed forms ask for.
-- Where an edge crosses z = 0 the distances may cancel; they are formed there with twice the digits.
+- A corner of a piece keeps its barycentric coordinates in the triangle, from which shares of the area are taken: no area
+  is lost, however small the triangle is against its coordinates, or the piece against the triangle.
+- It also keeps its z and its four distances beyond the borders. Each is a convex combination of the triangle's corners,
+  which are exact differences; a distance that has just been cut is exactly 0. So every coordinate of a piece is accurate
+  to its own size, and a piece lies in one octant, which is what the closed forms ask for.
+- Where an edge crosses z = 0 or a border in x, the distances beyond the other borders may cancel; they are formed there
+  with twice the digits. (Cuts in y come last and combine only distances of one sign.)
 - An edge is cut at the same point, to the last digit, whichever of its two pieces asks.
 """
 
@@ -24,6 +25,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.double_double import difference_of_products
 from replay.numerics.inverse_distance import mean_over_triangle
 from replay.numerics.jit import kernel
 from replay.numerics.log_difference import mean_inverse_linear
@@ -31,12 +33,14 @@ from replay.sensing.capacitive.contact import SATURATED, borders, contact, cross
 
 Floats = NDArray[np.float64]
 
-SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(7)
-"""Columns of a polygon's corner: barycentric coordinates of corners b and c, |z|, distances beyond the borders."""
+SHARE_A, SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(8)
+LOW = 4
+"""Columns of a polygon's corner: barycentric coordinates, |z|, distances beyond the borders. What
+rounding took from a distance is LOW columns behind it."""
 
 NONE = -1
 _ROUNDING_SHARE = 1e-12
-SCRATCH = (4, 12, 7)
+SCRATCH = (4, 12, 12)
 """Shape of the scratch memory of `integral_over_triangle`: four polygons of up to 12 corners."""
 
 
@@ -108,10 +112,7 @@ def _fan(piece: Floats, count: int, u: int, v: int) -> float:
     total = 0.0
     for k in range(1, count - 1):
         a, b, c = piece[0], piece[k], piece[k + 1]
-        share = abs(
-            (b[SHARE_B] - a[SHARE_B]) * (c[SHARE_C] - a[SHARE_C])
-            - (b[SHARE_C] - a[SHARE_C]) * (c[SHARE_B] - a[SHARE_B])
-        )
+        share = _share(a, b, c)
         if share <= 0.0:
             continue
         if u == NONE and v == NONE:
@@ -122,6 +123,20 @@ def _fan(piece: Floats, count: int, u: int, v: int) -> float:
         if mean < math.inf or share > _ROUNDING_SHARE:
             total += share * mean
     return total
+
+
+@kernel
+def _share(a: Floats, b: Floats, c: Floats) -> float:
+    """Return the area of a piece's triangle over the whole one's, from the two coordinates that are smallest there."""
+    in_a = a[SHARE_A] + b[SHARE_A] + c[SHARE_A]
+    in_b = a[SHARE_B] + b[SHARE_B] + c[SHARE_B]
+    in_c = a[SHARE_C] + b[SHARE_C] + c[SHARE_C]
+    first, second = SHARE_B, SHARE_C
+    if in_b >= in_a and in_b >= in_c:
+        first = SHARE_A
+    elif in_c >= in_a:
+        second = SHARE_A
+    return abs((b[first] - a[first]) * (c[second] - a[second]) - (b[second] - a[second]) * (c[first] - a[first]))
 
 
 @kernel
@@ -152,8 +167,18 @@ def _clip(polygon: Floats, count: int, column: int, sign: float, result: Floats)
             positive, negative = (p, q) if p[column] > 0.0 else (q, p)
             span = positive[column] - negative[column]
             w_positive, w_negative = -negative[column] / span, positive[column] / span
-            for c in range(7):
+            for c in range(8):
                 result[kept, c] = w_positive * positive[c] + w_negative * negative[c]
+                result[kept, c + LOW] = 0.0
+            if column in (EAST, WEST):
+                for c in (NORTH, SOUTH):
+                    cross = difference_of_products(
+                        (positive[column], positive[column + LOW]),
+                        (negative[c], negative[c + LOW]),
+                        (negative[column], negative[column + LOW]),
+                        (positive[c], positive[c + LOW]),
+                    )
+                    result[kept, c] = cross[0] / span
             result[kept, column] = 0.0
             kept += 1
     return kept
@@ -169,11 +194,14 @@ def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: fl
         here, there = sign * p[2], sign * q[2]
         if here >= 0.0:
             corner = polygon[kept]
+            corner[SHARE_A] = 1.0 if k == 0 else 0.0
             corner[SHARE_B] = 1.0 if k == 1 else 0.0
             corner[SHARE_C] = 1.0 if k == 2 else 0.0
             corner[HEIGHT] = here
-            corner[EAST], corner[WEST] = p[0] - half_x, -half_x - p[0]
-            corner[NORTH], corner[SOUTH] = p[1] - half_y, -half_y - p[1]
+            east, west, north, south = borders(p[0], p[1], half_x, half_y)
+            corner[EAST], corner[WEST], corner[NORTH], corner[SOUTH] = east[0], west[0], north[0], south[0]
+            corner[EAST + LOW], corner[WEST + LOW] = east[1], west[1]
+            corner[NORTH + LOW], corner[SOUTH + LOW] = north[1], south[1]
             kept += 1
         if (here > 0.0 > there) or (here < 0.0 < there):
             corner = polygon[kept]
@@ -181,6 +209,7 @@ def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: fl
             above, below = triangle[high], triangle[low]
             span = above[2] - below[2]
             w_high, w_low = -below[2] / span, above[2] / span
+            corner[SHARE_A] = w_high if high == 0 else (w_low if low == 0 else 0.0)
             corner[SHARE_B] = w_high if high == 1 else (w_low if low == 1 else 0.0)
             corner[SHARE_C] = w_high if high == 2 else (w_low if low == 2 else 0.0)
             corner[HEIGHT] = 0.0
@@ -192,5 +221,6 @@ def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: fl
             )
             corner[EAST], corner[WEST] = east[0] / span, west[0] / span
             corner[NORTH], corner[SOUTH] = north[0] / span, south[0] / span
+            corner[EAST + LOW :] = 0.0
             kept += 1
     return kept

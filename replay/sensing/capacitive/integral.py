@@ -40,8 +40,8 @@ def plate_integral(
     Raises:
         InvalidValue: a shape, a number or an option is not as stated.
 
-    Accuracy: "exact" 2e-14 relative to the integral, 1e-13 next to a corner of the plate (test_plate_integral). "midpoint" has an error of order 4^-splits
-    away from the plate's plane; one that crosses it on side "front" converges at order 2^-splits.
+    Accuracy: "exact" 1e-14 relative to the integral (test_plate_integral). "midpoint" has an error of order 4^-splits
+    away from the plate's plane; a triangle that crosses it on side "front" converges at order 2^-splits.
 
     Source: Huijgens 2015 for the model and "midpoint"; closed forms of all regions derived in `exact` and `numerics`.
     """
