@@ -3,6 +3,9 @@
 Every feature (corner, edge, face, interior) whose affine hull has the foot of the origin's perpendicular strictly
 inside it proposes that foot; each proposal is a point of the simplex, and the nearest point is one of them, so the
 smallest wins. A feature that is degenerate beyond the arithmetic proposes nothing: its lower features stand in for it.
+When a support point w was just added because it is lower along v than v itself, the nearest point's feature has w as a
+corner; asking for that settles ties that even double-doubles cannot see (a direction that is off by x makes the
+distance wrong by x^2 only).
 
 With edge e = q - p: weights (q.e, -p.e) over e.e. Faces and interior as in `simplex`.
 """
@@ -32,12 +35,13 @@ def corner(points: Floats, i: int) -> dd.Vector:
 
 
 @kernel
-def nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
+def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
     """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
 
     Args:
         points: (4, 3, 2) corners, high and low parts.
         n: number of corners.
+        newest: the corner that the nearest point's feature must have; -1 for any.
         size: bound on the corners' distance from the origin.
         weights: (4,) barycentric coordinates of the nearest point, out.
     """
@@ -50,13 +54,15 @@ def nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[bool,
     for i in range(n):
         p = corner(points, i)
         square = dd.dot(p, p)
-        if dd.is_less(square, best):
+        if newest in (-1, i) and dd.is_less(square, best):
             best = square
             best_point = p
             weights[:] = 0.0
             weights[i] = 1.0
     for i in range(n):
         for j in range(i + 1, n):
+            if newest not in (-1, i, j):
+                continue
             p, q = corner(points, i), corner(points, j)
             e = dd.difference(q, p)
             total = dd.dot(e, e)
@@ -78,7 +84,7 @@ def nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[bool,
         i = 0 if skipped > 0 else 1
         j = 1 if skipped > 1 else 2
         k = 2 if skipped > 2 else 3
-        if k >= n:
+        if k >= n or newest not in (-1, i, j, k):
             continue
         p, q, r = corner(points, i), corner(points, j), corner(points, k)
         u, v = dd.difference(q, p), dd.difference(r, p)
@@ -86,7 +92,11 @@ def nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[bool,
         total = dd.dot(normal, normal)
         if not total[0] > DEGENERATE**2 * dd.dot(u, u)[0] * dd.dot(v, v)[0]:
             continue
-        of_p, of_q, of_r = dd.dot(normal, dd.cross(q, r)), dd.dot(normal, dd.cross(r, p)), dd.dot(normal, dd.cross(p, q))
+        of_p, of_q, of_r = (
+            dd.dot(normal, dd.cross(q, r)),
+            dd.dot(normal, dd.cross(r, p)),
+            dd.dot(normal, dd.cross(p, q)),
+        )
         if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(of_r)):
             continue
         foot = dd.scale(dd.divide(dd.dot(normal, p), total), normal)
@@ -110,7 +120,7 @@ def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     sign = -1.0 if volume < 0.0 else 1.0
     limit = 2.0**-96 * size * size * size
     weights[0], weights[1], weights[2], weights[3] = a[0] / volume, b[0] / volume, c[0] / volume, d[0] / volume
-    return min(min(sign * a[0], sign * b[0]), min(sign * c[0], sign * d[0])) > limit
+    return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit
 
 
 @kernel

@@ -16,8 +16,8 @@ from replay.errors import InvalidValue
 Floats = NDArray[np.float64]
 
 RIGID_TOLERANCE = 1e-6
-"""Largest accepted |R^T R - I|. The vertices are mapped by the matrix as given, so a pose that is rigid to this tolerance
-costs no accuracy; a larger error is a scaled, sheared or mistyped matrix."""
+"""Largest accepted |R^T R - I|. The vertices are mapped by the matrix as given, so a pose that is rigid to this
+tolerance costs no accuracy; a larger error is a scaled, sheared or mistyped matrix."""
 
 LARGEST_COORDINATE = 1e100
 """Coordinates beyond this [m] are refused: their squares would overflow."""
@@ -85,8 +85,9 @@ def intersect(
         InvalidValue: wrong shape, not finite, beyond 1e100 m, or a pose that is not rigid to 1e-6.
 
     Accuracy:
-        Exact for the vertices rounded to doubles about a common origin: gaps down to 2^-90 of the scene's size are told
-        from contact (tests/collision/test_gjk.py). Poses and coordinates are rounded at 2^-53 of bodies and offset.
+        Exact for the vertices rounded to doubles about a common origin: gaps down to 2^-90 of the scene's size are
+        told from contact (tests/collision/test_gjk.py). Poses and coordinates are rounded at 2^-53 of bodies and
+        offset.
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.
     """
@@ -107,8 +108,9 @@ def distance(
     Args and Raises: as `intersect`.
 
     Accuracy:
-        Relative 1e-12 for the vertices rounded to doubles about a common origin, proven by `lower_bound`; that rounding
-        is a few 1e-16 of the scene's size (bodies and their offset). Swapping a and b gives the same bits.
+        For the vertices rounded to doubles about a common origin: relative 1e-12, plus 2^-90 of the scene's size
+        (bodies and their offset), proven by `lower_bound`. That rounding is below 1e-15 of the scene's size
+        (tests/collision/test_hard_cases.py). Swapping a and b gives the same bits.
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.
     """
@@ -125,9 +127,9 @@ def distance(
 class _Problem:
     """Two vertex sets about a common origin, scaled by a power of two to size 1, and what GJK says of them.
 
-    With origin o halfway between the poses' origins, a is mapped to R_a a + h and b to R_b b - h, h = (p_a - p_b)/2: the
-    world position cancels before anything is rounded, and swapping the arguments swaps the numbers bit by bit. Without
-    poses an origin is subtracted only along axes on which that is exact (Sterbenz).
+    With origin o halfway between the poses' origins, a is mapped to R_a a + h and b to R_b b - h, h = (p_a - p_b)/2:
+    the world position cancels before anything is rounded, and swapping the arguments swaps the numbers bit by bit.
+    An origin far from the vertices is subtracted only along axes on which that is exact (Sterbenz).
     """
 
     def __init__(self, a: ArrayLike, b: ArrayLike, pose_a: ArrayLike | None, pose_b: ArrayLike | None) -> None:

@@ -34,8 +34,14 @@ TOUCHING = 2.0**-90
 ROUNDING = 2.0**-94
 """Bound of the error of a lower bound on the gap, over size, in double-doubles."""
 
-CLOSED = 2.0**-50
+CLOSED = 2.0**-48
 """A duality gap below this times the distance ends the search: the distance is right to the last bits."""
+
+SAFE = 1.0 - 2.0**-50
+"""Keeps a lower bound below what its last division and root may have added."""
+
+NO_PROGRESS = 1.0 + 2.0**-80
+"""A squared distance that grows by more than this factor ends the search. Equal ones go on: they still turn v."""
 
 # What a query leaves in `Workspace.result`.
 DISTANCE = 0  # distance of the two witness points: an upper bound [m]
@@ -69,13 +75,13 @@ def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[floa
 
 @kernel
 def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) -> int:
-    """Drop the points of weight 0 from a simplex of n, in place; return how many remain."""
+    """Drop the points (4, 3) of weight 0 from a simplex of n, in place; return how many remain."""
     kept = 0
     for i in range(n):
         if weights[i] > 0.0:
             if kept != i:
                 simplex[kept, 0], simplex[kept, 1] = simplex[i, 0], simplex[i, 1]
-                points[kept] = points[i]
+                points[kept, 0], points[kept, 1], points[kept, 2] = points[i, 0], points[i, 1], points[i, 2]
                 weights[kept] = weights[i]
             kept += 1
     simplex[4, 0] = kept
@@ -114,7 +120,7 @@ def _farthest(
     sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, margin: float
 ) -> int:
     """Return the vertex row of set k farthest along a direction (A's frame), compared in double-doubles."""
-    best = sets.first[k]
+    best = int(sets.first[k])
     top = -np.inf
     x, y, z = direction[0][0], direction[1][0], direction[2][0]
     for i in range(sets.first[k], sets.first[k + 1]):
@@ -156,7 +162,7 @@ def refine(
     result[EXACT] = 1.0
     result[LOWER] = 0.0
     result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = 0.0, 0.0, 0.0
-    inside, v, square = exact_simplex.nearest(points, n, size, weights)
+    inside, v, square = exact_simplex.nearest(points, n, -1, size, weights)
     for _ in range(ITERATIONS):
         result[STEPS] += 1.0
         length = math.sqrt(square[0])
@@ -164,16 +170,18 @@ def refine(
         if inside or not length > TOUCHING * size:
             result[DISTANCE] = 0.0
             result[LOWER] = 0.0
-            n = keep_supporting(simplex, points, weights, n)
+            keep_supporting(simplex, work.points, weights, n)
             write_witness(a, b, rotation, translation, work)
             return CONTACT if inside or length <= TOUCHING * size else UNDECIDED
-        n = keep_supporting(simplex, points, weights, n)
+        n = keep_supporting(simplex, work.points, weights, n)
+        for k in range(n):
+            _point(points, k, a, simplex[k, 0], b, simplex[k, 1], rotation, translation)
         backward = (dd.negative(v[0]), dd.negative(v[1]), dd.negative(v[2]))
         margin = 2.0**-48 * size * length
         i = _farthest(a, set_a, rotation, translation, backward, False, margin)
         j = _farthest(b, set_b, rotation, translation, v, True, margin)
         _point(points, n, a, i, b, j, rotation, translation)
-        lower = dd.dot(v, exact_simplex.corner(points, n))[0] / length - ROUNDING * size
+        lower = SAFE * (dd.dot(v, exact_simplex.corner(points, n))[0] / length) - ROUNDING * size
         if lower > result[LOWER]:
             result[LOWER] = lower
             for axis in range(3):
@@ -184,13 +192,15 @@ def refine(
         if result[LOWER] > cutoff or repeated or length - result[LOWER] <= CLOSED * length:
             break
         simplex[n, 0], simplex[n, 1] = i, j
-        inside, nearer, square_nearer = exact_simplex.nearest(points, n + 1, size, weights)
-        if not inside and not dd.is_less(square_nearer, square):
-            # no progress beyond the arithmetic: v stays; its weights are those of the points without the new one
-            exact_simplex.nearest(points, n, size, weights)
+        inside, nearer, square_nearer = exact_simplex.nearest(points, n + 1, n, size, weights)
+        if not inside and not square_nearer[0] <= NO_PROGRESS * square[0]:
             break
         v, square = nearer, square_nearer
         n += 1
         simplex[4, 0] = n
+    n = simplex[4, 0]
+    exact_simplex.nearest(points, n, -1, size, weights)
     write_witness(a, b, rotation, translation, work)
-    return SEPARATED if result[LOWER] > 0.0 else UNDECIDED
+    if result[LOWER] > 0.0:
+        return SEPARATED
+    return UNDECIDED

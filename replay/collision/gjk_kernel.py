@@ -141,6 +141,9 @@ def query(
                 result[DISTANCE] = length
                 return SEPARATED
             if length - result[LOWER] <= CLOSED * length + slack:
+                witness = _witness_distance(points, n, weights)
+                if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
+                    break  # a sliver's normal was off, and v with it
                 result[DISTANCE] = length
                 write_witness(a, b, rotation, translation, work)
                 return SEPARATED
@@ -157,15 +160,31 @@ def query(
 
 
 @kernel
+def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
+    """Return the distance from the origin of the point of the simplex that the weights stand for."""
+    x, y, z = 0.0, 0.0, 0.0
+    for k in range(n):
+        x += weights[k] * points[k, 0]
+        y += weights[k] * points[k, 1]
+        z += weights[k] * points[k, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
 def _nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[int, float, float, float]:
     """Return (OUTSIDE | INSIDE | UNSURE, x, y, z): the simplex's point nearest to the origin, its weights written."""
+    place = faces.OUTSIDE
+    a = (points[0, 0], points[0, 1], points[0, 2])
+    b = (points[1, 0], points[1, 1], points[1, 2])
+    c = (points[2, 0], points[2, 1], points[2, 2])
     if n == 1:
-        weights[0] = 1.0
-        return faces.OUTSIDE, points[0, 0], points[0, 1], points[0, 2]
-    if n == 2:
-        x, y, z = faces.nearest_on_segment(points, 0, 1, weights)
-        return faces.OUTSIDE, x, y, z
-    if n == 3:
-        x, y, z = faces.nearest_on_triangle(points, 0, 1, 2, weights)
-        return faces.OUTSIDE, x, y, z
-    return faces.nearest_on_tetrahedron(points, size, weights)
+        point, weights[0] = a, 1.0
+    elif n == 2:
+        point, weights[0], weights[1] = faces.nearest_on_segment(a, b)
+    elif n == 3:
+        point, weights[0], weights[1], weights[2] = faces.nearest_on_triangle(a, b, c)
+    else:
+        d = (points[3, 0], points[3, 1], points[3, 2])
+        place, point, wa, wb, wc, wd = faces.nearest_on_tetrahedron(a, b, c, d, size)
+        weights[0], weights[1], weights[2], weights[3] = wa, wb, wc, wd
+    return place, point[0], point[1], point[2]

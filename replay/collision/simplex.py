@@ -14,13 +14,14 @@ Tetrahedron p0..p3: with D_ijk = p_i.(p_j x p_k), the barycentric coordinates of
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
 from replay.numerics.jit import kernel
 
-Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
+Point = tuple[float, float, float]
+Near2 = tuple[Point, float, float]
+Near3 = tuple[Point, float, float, float]
+Near4 = tuple[int, Point, float, float, float, float]
 
 OUTSIDE = 0
 INSIDE = 1
@@ -31,149 +32,139 @@ DETERMINANT_ERROR = 64.0 * 2.0**-53
 
 
 @kernel
-def nearest_on_segment(p: Floats, i: int, j: int, weights: Floats) -> Triple:
-    """Return the point of the segment p[i] p[j] nearest to the origin; its weights are written at i and j."""
-    ex, ey, ez = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[j, 2] - p[i, 2]
-    along = -(p[i, 0] * ex + p[i, 1] * ey + p[i, 2] * ez)
-    square = ex * ex + ey * ey + ez * ez
+def dot(u: Point, v: Point) -> float:
+    """Return the inner product."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@kernel
+def cross(u: Point, v: Point) -> Point:
+    """Return the vector product."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@kernel
+def difference(u: Point, v: Point) -> Point:
+    """Return u - v."""
+    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
+
+
+@kernel
+def nearest_on_segment(a: Point, b: Point) -> Near2:
+    """Return the point of the segment ab nearest to the origin, and the weights of a and b."""
+    e = difference(b, a)
+    along = -dot(a, e)
+    square = dot(e, e)
     if along <= 0.0 or square == 0.0:
-        weights[i], weights[j] = 1.0, 0.0
-        return p[i, 0], p[i, 1], p[i, 2]
+        return a, 1.0, 0.0
     if along >= square:
-        weights[i], weights[j] = 0.0, 1.0
-        return p[j, 0], p[j, 1], p[j, 2]
+        return b, 0.0, 1.0
     t = along / square
-    weights[i], weights[j] = 1.0 - t, t
     if t <= 0.5:
-        return p[i, 0] + t * ex, p[i, 1] + t * ey, p[i, 2] + t * ez
-    t = 1.0 - t
-    return p[j, 0] - t * ex, p[j, 1] - t * ey, p[j, 2] - t * ez
+        return (a[0] + t * e[0], a[1] + t * e[1], a[2] + t * e[2]), 1.0 - t, t
+    s = 1.0 - t
+    return (b[0] - s * e[0], b[1] - s * e[1], b[2] - s * e[2]), s, t
 
 
 @kernel
-def nearest_on_triangle(p: Floats, i: int, j: int, k: int, weights: Floats) -> Triple:
-    """Return the point of the triangle p[i] p[j] p[k] nearest to the origin; weights are written at i, j and k."""
-    ux, uy, uz = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[j, 2] - p[i, 2]
-    vx, vy, vz = p[k, 0] - p[i, 0], p[k, 1] - p[i, 1], p[k, 2] - p[i, 2]
-    weights[i], weights[j], weights[k] = 0.0, 0.0, 0.0
-    # corner i
-    d1 = -(ux * p[i, 0] + uy * p[i, 1] + uz * p[i, 2])
-    d2 = -(vx * p[i, 0] + vy * p[i, 1] + vz * p[i, 2])
-    if d1 <= 0.0 and d2 <= 0.0:
-        weights[i] = 1.0
-        return p[i, 0], p[i, 1], p[i, 2]
-    # corner j
-    d3 = -(ux * p[j, 0] + uy * p[j, 1] + uz * p[j, 2])
-    d4 = -(vx * p[j, 0] + vy * p[j, 1] + vz * p[j, 2])
-    if d3 >= 0.0 and d4 <= d3:
-        weights[j] = 1.0
-        return p[j, 0], p[j, 1], p[j, 2]
-    # corner k
-    d5 = -(ux * p[k, 0] + uy * p[k, 1] + uz * p[k, 2])
-    d6 = -(vx * p[k, 0] + vy * p[k, 1] + vz * p[k, 2])
-    if d6 >= 0.0 and d5 <= d6:
-        weights[k] = 1.0
-        return p[k, 0], p[k, 1], p[k, 2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    square = nx * nx + ny * ny + nz * nz
-    if square == 0.0:
-        return _nearest_on_border(p, i, j, k, weights)
-    # edges: the area opposite to a corner has no positive share
-    share_k = nx * (p[i, 1] * p[j, 2] - p[i, 2] * p[j, 1])
-    share_k += ny * (p[i, 2] * p[j, 0] - p[i, 0] * p[j, 2])
-    share_k += nz * (p[i, 0] * p[j, 1] - p[i, 1] * p[j, 0])
-    if share_k <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        return nearest_on_segment(p, i, j, weights)
-    share_j = nx * (p[k, 1] * p[i, 2] - p[k, 2] * p[i, 1])
-    share_j += ny * (p[k, 2] * p[i, 0] - p[k, 0] * p[i, 2])
-    share_j += nz * (p[k, 0] * p[i, 1] - p[k, 1] * p[i, 0])
-    if share_j <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        return nearest_on_segment(p, i, k, weights)
-    share_i = square - share_j - share_k
-    if share_i <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        return nearest_on_segment(p, j, k, weights)
-    if share_i <= 0.0 or share_j <= 0.0 or share_k <= 0.0:
-        return _nearest_on_border(p, i, j, k, weights)
-    # face
-    weights[i], weights[j], weights[k] = share_i / square, share_j / square, share_k / square
-    distance = (nx * p[i, 0] + ny * p[i, 1] + nz * p[i, 2]) / square
-    return nx * distance, ny * distance, nz * distance
+def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
+    """Return the point of the triangle abc nearest to the origin, and the weights of a, b and c."""
+    u, v = difference(b, a), difference(c, a)
+    # corner regions
+    au, av = -dot(u, a), -dot(v, a)
+    if au <= 0.0 and av <= 0.0:
+        return a, 1.0, 0.0, 0.0
+    bu, bv = -dot(u, b), -dot(v, b)
+    if bu >= 0.0 and bv <= bu:
+        return b, 0.0, 1.0, 0.0
+    cu, cv = -dot(u, c), -dot(v, c)
+    if cv >= 0.0 and cu <= cv:
+        return c, 0.0, 0.0, 1.0
+    # edge regions: the corner opposite has no positive share
+    n = cross(u, v)
+    square = dot(n, n)
+    share_c = dot(n, cross(a, b))
+    share_b = dot(n, cross(c, a))
+    share_a = square - share_b - share_c
+    if share_c <= 0.0 and au >= 0.0 and bu <= 0.0:
+        point, wa, wb = nearest_on_segment(a, b)
+        return point, wa, wb, 0.0
+    if share_b <= 0.0 and av >= 0.0 and cv <= 0.0:
+        point, wa, wc = nearest_on_segment(a, c)
+        return point, wa, 0.0, wc
+    if share_a <= 0.0 and bv >= bu and cu >= cv:
+        point, wb, wc = nearest_on_segment(b, c)
+        return point, 0.0, wb, wc
+    if not (share_a > 0.0 and share_b > 0.0 and share_c > 0.0):
+        return _nearest_on_border(a, b, c)
+    # face region
+    distance = dot(n, a) / square
+    weight_b, weight_c = share_b / square, share_c / square
+    return (n[0] * distance, n[1] * distance, n[2] * distance), 1.0 - weight_b - weight_c, weight_b, weight_c
 
 
 @kernel
-def _nearest_on_border(p: Floats, i: int, j: int, k: int, weights: Floats) -> Triple:
+def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     """Let the three edges of a triangle compete: for one that is degenerate or contradicts itself."""
-    best = np.inf
-    x, y, z = 0.0, 0.0, 0.0
-    wi, wj, wk = 0.0, 0.0, 0.0
-    for skipped in range(3):
-        first, second = (j, k) if skipped == 0 else ((i, k) if skipped == 1 else (i, j))
-        weights[i], weights[j], weights[k] = 0.0, 0.0, 0.0
-        qx, qy, qz = nearest_on_segment(p, first, second, weights)
-        square = qx * qx + qy * qy + qz * qz
-        if square < best:
-            best = square
-            x, y, z = qx, qy, qz
-            wi, wj, wk = weights[i], weights[j], weights[k]
-    weights[i], weights[j], weights[k] = wi, wj, wk
-    return x, y, z
+    point, wa, wb = nearest_on_segment(a, b)
+    wc = 0.0
+    other, va, vc = nearest_on_segment(a, c)
+    if dot(other, other) < dot(point, point):
+        point, wa, wb, wc = other, va, 0.0, vc
+    other, vb, vc = nearest_on_segment(b, c)
+    if dot(other, other) < dot(point, point):
+        point, wa, wb, wc = other, 0.0, vb, vc
+    return point, wa, wb, wc
 
 
 @kernel
-def nearest_on_tetrahedron(p: Floats, size: float, weights: Floats) -> tuple[int, float, float, float]:
-    """Return (OUTSIDE | INSIDE | UNSURE, x, y, z): whether the origin is in the tetrahedron, else its nearest point.
+def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
+    """Return (OUTSIDE | INSIDE | UNSURE, point, weights of a, b, c, d).
 
-    Args:
-        p: (4, 3) corners.
-        size: bound on the coordinates that p was formed from.
-        weights: (4,) barycentric coordinates, out; of the origin when inside.
+    UNSURE if rounding may put the origin on either side. The point is the tetrahedron's nearest to the origin if
+    OUTSIDE; if INSIDE it is the origin. `size` bounds the coordinates that the corners are differences of.
     """
-    ax, ay, az = _cross(p, 0, 1)
-    bx, by, bz = _cross(p, 2, 3)
-    s0 = p[1, 0] * bx + p[1, 1] * by + p[1, 2] * bz
-    s1 = -(p[0, 0] * bx + p[0, 1] * by + p[0, 2] * bz)
-    s2 = p[3, 0] * ax + p[3, 1] * ay + p[3, 2] * az
-    s3 = -(p[2, 0] * ax + p[2, 1] * ay + p[2, 2] * az)
-    largest = 0.0
-    for i in range(4):
-        largest = max(largest, p[i, 0] * p[i, 0] + p[i, 1] * p[i, 1] + p[i, 2] * p[i, 2])
-    limit = DETERMINANT_ERROR * size * largest
-    volume = s0 + s1 + s2 + s3
-    flat = abs(volume) <= 4.0 * limit
+    ab, cd = cross(a, b), cross(c, d)
+    sa, sb, sc, sd = dot(b, cd), -dot(a, cd), dot(d, ab), -dot(c, ab)
+    limit = DETERMINANT_ERROR * size * max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
+    volume = sa + sb + sc + sd
     if volume < 0.0:
-        s0, s1, s2, s3 = -s0, -s1, -s2, -s3
-        volume = -volume
-    if not flat and s0 > limit and s1 > limit and s2 > limit and s3 > limit:
-        weights[0], weights[1], weights[2], weights[3] = s0 / volume, s1 / volume, s2 / volume, s3 / volume
-        return INSIDE, 0.0, 0.0, 0.0
-    if not flat and s0 >= -limit and s1 >= -limit and s2 >= -limit and s3 >= -limit:
-        return UNSURE, 0.0, 0.0, 0.0
-    # outside: the faces that the origin is beyond, or may be, compete
-    best = np.inf
-    x, y, z = 0.0, 0.0, 0.0
-    w0, w1, w2, w3 = 0.0, 0.0, 0.0, 0.0
+        sa, sb, sc, sd, volume = -sa, -sb, -sc, -sd, -volume
+    least = min(sa, sb, sc, sd)
+    origin = (0.0, 0.0, 0.0)
+    if volume > 4.0 * limit:
+        if least > limit:
+            return INSIDE, origin, sa / volume, sb / volume, sc / volume, sd / volume
+        if least >= -limit:
+            return UNSURE, origin, 0.0, 0.0, 0.0, 0.0
+    else:
+        limit = math.inf
+    # outside, or flat: the faces that the origin is beyond, or may be, compete
+    best = math.inf
+    nearest = origin
+    wa, wb, wc, wd = 0.0, 0.0, 0.0, 0.0
     for skipped in range(4):
-        share = s0 if skipped == 0 else (s1 if skipped == 1 else (s2 if skipped == 2 else s3))
-        if not flat and share > limit:
+        if skipped == 0:
+            share, p, q, r = sd, a, b, c
+        elif skipped == 1:
+            share, p, q, r = sc, a, b, d
+        elif skipped == 2:
+            share, p, q, r = sb, a, c, d
+        else:
+            share, p, q, r = sa, b, c, d
+        if share > limit:
             continue
-        i = 0 if skipped > 0 else 1
-        j = 1 if skipped > 1 else 2
-        k = 2 if skipped > 2 else 3
-        weights[skipped] = 0.0
-        qx, qy, qz = nearest_on_triangle(p, i, j, k, weights)
-        square = qx * qx + qy * qy + qz * qz
+        point, wp, wq, wr = nearest_on_triangle(p, q, r)
+        square = dot(point, point)
         if square < best:
             best = square
-            x, y, z = qx, qy, qz
-            w0, w1, w2, w3 = weights[0], weights[1], weights[2], weights[3]
-    weights[0], weights[1], weights[2], weights[3] = w0, w1, w2, w3
-    return OUTSIDE, x, y, z
-
-
-@kernel
-def _cross(p: Floats, i: int, j: int) -> Triple:
-    return (
-        p[i, 1] * p[j, 2] - p[i, 2] * p[j, 1],
-        p[i, 2] * p[j, 0] - p[i, 0] * p[j, 2],
-        p[i, 0] * p[j, 1] - p[i, 1] * p[j, 0],
-    )
+            nearest = point
+            if skipped == 0:
+                wa, wb, wc, wd = wp, wq, wr, 0.0
+            elif skipped == 1:
+                wa, wb, wc, wd = wp, wq, 0.0, wr
+            elif skipped == 2:
+                wa, wb, wc, wd = wp, 0.0, wq, wr
+            else:
+                wa, wb, wc, wd = 0.0, wp, wq, wr
+    return OUTSIDE, nearest, wa, wb, wc, wd

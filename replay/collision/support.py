@@ -29,33 +29,46 @@ def farthest(sets: Sets, k: int, x: float, y: float, z: float, hint: int) -> int
     Sets with adjacency are climbed from the row `hint` over ever farther neighbours; on a convex set that ends at the
     farthest vertex to within rounding.
     """
-    begin = sets.first[k]
-    if sets.neighbors_first[begin] == sets.neighbors_first[sets.first[k + 1]]:
-        return farthest_of_all(sets, k, x, y, z)
-    vertices = sets.vertices
-    best = hint if begin <= hint < sets.first[k + 1] else begin
-    top = vertices[best, 0] * x + vertices[best, 1] * y + vertices[best, 2] * z
-    while True:
-        centre = best
-        for e in range(sets.neighbors_first[centre], sets.neighbors_first[centre + 1]):
-            i = begin + sets.neighbors[e]
-            height = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
-            if height > top:
-                top = height
-                best = i
-        if best == centre:
-            return best
+    begin, end = sets.first[k], sets.first[k + 1]
+    if sets.neighbors_first[begin] == sets.neighbors_first[end]:
+        return farthest_of_all(sets.vertices, begin, end, x, y, z)
+    start = hint if begin <= hint < end else begin
+    return _climb(sets.vertices, sets.neighbors_first, sets.neighbors, begin, start, x, y, z)
 
 
 @kernel
-def farthest_of_all(sets: Sets, k: int, x: float, y: float, z: float) -> int:
-    """Return the vertex of set k (its row in `vertices`) that is farthest along (x, y, z), looking at each one."""
-    vertices = sets.vertices
-    best = sets.first[k]
+def farthest_of_all(vertices: Floats, begin: int, end: int, x: float, y: float, z: float) -> int:
+    """Return the row of vertices[begin:end] that is farthest along (x, y, z), the first of equals."""
+    best = begin
     top = -np.inf
-    for i in range(sets.first[k], sets.first[k + 1]):
+    for i in range(begin, end):
         height = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
         if height > top:
             top = height
             best = i
+    return best
+
+
+@kernel
+def _climb(
+    vertices: Floats,
+    neighbors_first: Integers,
+    neighbors: Integers,
+    begin: int,
+    start: int,
+    x: float,
+    y: float,
+    z: float,
+) -> int:
+    best = start
+    top = vertices[best, 0] * x + vertices[best, 1] * y + vertices[best, 2] * z
+    centre = -1
+    while centre != best:
+        centre = best
+        for e in range(neighbors_first[centre], neighbors_first[centre + 1]):
+            i = begin + neighbors[e]
+            height = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
+            if height > top:
+                top = height
+                best = i
     return best

@@ -20,10 +20,10 @@ def box(size):
     return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * np.asarray(size, dtype=float)
 
 
-def world(points, rotation, position):
-    """Return R p + t in extended precision, from the doubles as they are."""
-    points, rotation, position = (np.asarray(value).astype(Wide) for value in (points, rotation, position))
-    return points @ rotation.T + position
+def placed(points, pose, origin):
+    """Return R p + (t - origin) in extended precision, from the doubles as they are."""
+    points, pose, origin = (np.asarray(value).astype(Wide) for value in (points, pose, origin))
+    return points @ pose[:3, :3].T + (pose[:3, 3] - origin)
 
 
 def _directions(points, edges):
