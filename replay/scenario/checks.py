@@ -161,8 +161,14 @@ def _sensors(names: Names) -> Iterator[Finding]:
 
 def _disabled(names: Names) -> Iterator[Finding]:
     for index, entry in enumerate(names.disable):
-        if entry is not None:
-            yield from _patterns(names, ("collision", "disable", index, "pair"), entry.pair)
+        if entry is None:
+            continue
+        path: Path = ("collision", "disable", index, "pair")
+        found = list(_patterns(names, path, entry.pair))
+        yield from found
+        sides = [names.shapes_matching(pattern) for pattern in entry.pair]
+        if not found and not any(a.link != b.link for a in sides[0] for b in sides[1]):
+            yield path, f"{list(entry.pair)}: these match no two shapes on different links"
 
 
 def _patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:

@@ -10,6 +10,9 @@ from pydantic import AfterValidator, Field, model_validator
 from replay.scenario.fields import Flag, Name, Part, Placement, rejected
 from replay.scenario.units import JointAcceleration, JointPosition, JointVelocity, Share, Time
 
+SHORTEST = 1e-9
+"""Shortest time between two points [s]: the resolution of recordings, and it keeps polynomials finite."""
+
 
 class Waypoint(Part):
     """What a joint passes at one time; an interval is linear, cubic or quintic, as far as both its ends go."""
@@ -52,8 +55,8 @@ class Keyframe(Placement):
 
 def _increasing(items: tuple[Waypoint | Keyframe, ...]) -> tuple[Waypoint | Keyframe, ...]:
     for index, (earlier, later) in enumerate(itertools.pairwise(items), start=1):
-        if not later.time > earlier.time:
-            raise rejected(f"must be above the one before, {earlier.time:.6g} s", at=(index, "time"))
+        if not later.time - earlier.time >= SHORTEST:
+            raise rejected(f"must be above the one before, {earlier.time:.6g} s, by 1 ns or more", at=(index, "time"))
     return items
 
 

@@ -21,7 +21,7 @@ from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoint
 from replay.scenario.node import Node
 from replay.scenario.sensors import CapacitiveSensor, DistanceSensor
 from replay.scenario.source import find
-from replay.scenario.units import NonNegativeLength
+from replay.scenario.units import Distance
 
 SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
 
@@ -155,7 +155,7 @@ class Names:
         """collision.margin [m]."""
         if find(self.root, ("collision", "margin")) is None:
             return 0.05
-        result: float | None = self._entry(NonNegativeLength, "collision", "margin")
+        result: float | None = self._entry(Distance, "collision", "margin")
         return result
 
     @cached_property

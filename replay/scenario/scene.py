@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.pairs import CollisionBody, DisabledPair, Pair, plan_pairs
-from replay.errors import InvalidValue, MeshError, Problem, ScenarioError
+from replay.errors import MeshError, Problem, ScenarioError
 from replay.geometry import primitives
 from replay.geometry.mesh import load_mesh
 from replay.geometry.solid import Solid
@@ -180,10 +180,6 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
             except MeshError as error:
                 path = ("links", link, "shapes", name, "file")
                 problems.append(scenario.provenance.problem(path, f"cannot be used: {error.reason}"))
-                continue
-            except InvalidValue as error:
-                path = ("links", link, "shapes", name, error.name)
-                problems.append(scenario.provenance.problem(path, error.rule))
                 continue
             placed = solid.transformed(transform(shape.pose))
             index = machine.link_index(link)

@@ -63,7 +63,7 @@ def motion_problems(scenario: Scenario) -> Iterator[Problem]:
         profiles = joint_profiles(machine, motion)
     except InvalidValue as error:
         path = tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", error.name))
-        yield scenario.provenance.problem(path, error.rule)
+        yield scenario.provenance.problem(path, f"cannot be done: {error.rule}")
         return
     for joint in machine.joints:
         try:

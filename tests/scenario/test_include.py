@@ -32,7 +32,7 @@ links: {arm: {joint: {type: revolute, velocity: 1, acceleration: 1}, shapes: {ba
 motion: {moves: [{to: {arm: 0.5}}]}
 collision: {margin: 1 cm, disable: [{pair: [arm, hand], reason: first}]}
 """,
-        parts__hand="links: {hand: {parent: arm}}\n",
+        parts__hand="links: {hand: {shapes: {palm: {type: cube, size: 1}}}}\n",
         eye="sensors: {distance: {eye: {link: hand, aperture: 1}}}\nmodel: {distance: {method: thesis}}\n",
     )
     assert list(scenario.links) == ["hand", "arm", "floor"]
