@@ -8,11 +8,11 @@ z = 0 and by the four border planes into at most 9 convex pieces a side, each is
 
 u, v and z being linear on a piece. All terms are positive. What makes it exact to rounding:
 
-- A corner of a piece keeps its barycentric coordinates in the triangle, from which shares of the area are taken: no area
-  is lost, however small the triangle is against its coordinates, or the piece against the triangle.
+- A corner of a piece keeps its barycentric coordinates in the triangle, from which shares of the area are taken: no
+  area is lost, however small the triangle is against its coordinates, or the piece against the triangle.
 - It also keeps its z and its four distances beyond the borders. Each is a convex combination of the triangle's corners,
-  which are exact differences; a distance that has just been cut is exactly 0. So every coordinate of a piece is accurate
-  to its own size, and a piece lies in one octant, which is what the closed forms ask for.
+  which are exact differences; a distance that has just been cut is exactly 0. So every coordinate of a piece is
+  accurate to its own size, and a piece lies in one octant, which is what the closed forms ask for.
 - Where an edge crosses z = 0 or a border in x, the distances beyond the other borders may cancel; they are formed there
   with twice the digits. (Cuts in y come last and combine only distances of one sign.)
 - An edge is cut at the same point, to the last digit, whichever of its two pieces asks.
@@ -35,12 +35,13 @@ Floats = NDArray[np.float64]
 
 SHARE_A, SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(8)
 LOW = 4
+COLUMNS = 12
 """Columns of a polygon's corner: barycentric coordinates, |z|, distances beyond the borders. What
 rounding took from a distance is LOW columns behind it."""
 
 NONE = -1
 _ROUNDING_SHARE = 1e-12
-SCRATCH = (4, 12, 12)
+SCRATCH = (4, 12, COLUMNS)
 """Shape of the scratch memory of `integral_over_triangle`: four polygons of up to 12 corners."""
 
 
@@ -71,39 +72,32 @@ def integral_over_triangle(
 @kernel
 def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: Floats) -> float:
     """Return the sum of share x mean of 1/dist over the triangle's part with sign z >= 0."""
-    polygon = scratch[0]
+    polygon, slab, piece, spare = scratch[0], scratch[1], scratch[2], scratch[3]
     count = _cut_by_plate_plane(triangle, sign, half_x, half_y, polygon)
-    if count < 3:
-        return 0.0
-    east, west = _is_beyond(polygon, count, EAST), _is_beyond(polygon, count, WEST)
-    if not (east or west):
-        return _columns(polygon, count, NONE, scratch)
-    slab, other = scratch[1], scratch[2]
     total = 0.0
-    if east:
-        total += _columns(slab, _clip(polygon, count, EAST, 1.0, slab), EAST, scratch)
-    if west:
-        total += _columns(slab, _clip(polygon, count, WEST, 1.0, slab), WEST, scratch)
-    between = _clip(polygon, count, EAST, -1.0, other)
-    return total + _columns(slab, _clip(other, between, WEST, -1.0, slab), NONE, scratch)
+    for column in range(3):
+        u = (EAST, WEST, NONE)[column]
+        in_slab = _region(polygon, count, u, EAST, slab, spare)
+        if in_slab < 3:
+            continue
+        for row in range(3):
+            v = (NORTH, SOUTH, NONE)[row]
+            total += _fan(piece, _region(slab, in_slab, v, NORTH, piece, spare), u, v)
+    return total
 
 
 @kernel
-def _columns(slab: Floats, count: int, u: int, scratch: Floats) -> float:
-    """Return the sum over the three regions of one slab in x, whose distance component in x is column u."""
-    if count < 3:
-        return 0.0
-    north, south = _is_beyond(slab, count, NORTH), _is_beyond(slab, count, SOUTH)
-    if not (north or south):
-        return _fan(slab, count, u, NONE)
-    piece, other = scratch[3], scratch[2]
-    total = 0.0
-    if north:
-        total += _fan(piece, _clip(slab, count, NORTH, 1.0, piece), u, NORTH)
-    if south:
-        total += _fan(piece, _clip(slab, count, SOUTH, 1.0, piece), u, SOUTH)
-    between = _clip(slab, count, NORTH, -1.0, other)
-    return total + _fan(piece, _clip(other, between, SOUTH, -1.0, piece), u, NONE)
+def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
+    """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE."""
+    first = border if outside == NONE else outside
+    sign = -1.0 if outside == NONE else 1.0
+    kept = 0
+    for step in range(2 if outside == NONE else 1):
+        # first into `spare` when a second cut follows
+        source = polygon if step == 0 else spare
+        target = spare if outside == NONE and step == 0 else result
+        kept = _clip(source, count if step == 0 else kept, first + step, sign, target)
+    return kept
 
 
 @kernel
@@ -145,40 +139,33 @@ def _distance(corner: Floats, u: int, v: int) -> tuple[float, float, float]:
 
 
 @kernel
-def _is_beyond(polygon: Floats, count: int, column: int) -> bool:
-    beyond = False
-    for k in range(count):
-        beyond = beyond or polygon[k, column] > 0.0
-    return beyond
-
-
-@kernel
 def _clip(polygon: Floats, count: int, column: int, sign: float, result: Floats) -> int:
     """Write the part of a convex polygon where sign x column >= 0 to `result`; return its number of corners."""
     kept = 0
     for k in range(count):
-        p, q = polygon[k], polygon[k + 1 if k + 1 < count else 0]
-        here, there = sign * p[column], sign * q[column]
+        following = k + 1 if k + 1 < count else 0
+        here, there = sign * polygon[k, column], sign * polygon[following, column]
         if here >= 0.0:
-            result[kept] = p
+            for c in range(COLUMNS):
+                result[kept, c] = polygon[k, c]
             kept += 1
         if (here > 0.0 > there) or (here < 0.0 < there):
             # weights by sign, not by direction: both sides of the cut compute the same point
-            positive, negative = (p, q) if p[column] > 0.0 else (q, p)
-            span = positive[column] - negative[column]
-            w_positive, w_negative = -negative[column] / span, positive[column] / span
-            for c in range(8):
-                result[kept, c] = w_positive * positive[c] + w_negative * negative[c]
-                result[kept, c + LOW] = 0.0
-            if column in (EAST, WEST):
-                for c in (NORTH, SOUTH):
+            p, n = (k, following) if polygon[k, column] > 0.0 else (following, k)
+            span = polygon[p, column] - polygon[n, column]
+            w_p, w_n = -polygon[n, column] / span, polygon[p, column] / span
+            for c in range(LOW + EAST):
+                result[kept, c] = w_p * polygon[p, c] + w_n * polygon[n, c]
+                if column <= WEST and c >= NORTH:
                     cross = difference_of_products(
-                        (positive[column], positive[column + LOW]),
-                        (negative[c], negative[c + LOW]),
-                        (negative[column], negative[column + LOW]),
-                        (positive[c], positive[c + LOW]),
+                        (polygon[p, column], polygon[p, column + LOW]),
+                        (polygon[n, c], polygon[n, c + LOW]),
+                        (polygon[n, column], polygon[n, column + LOW]),
+                        (polygon[p, c], polygon[p, c + LOW]),
                     )
                     result[kept, c] = cross[0] / span
+            for c in range(LOW + EAST, COLUMNS):
+                result[kept, c] = 0.0
             result[kept, column] = 0.0
             kept += 1
     return kept
@@ -221,6 +208,7 @@ def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: fl
             )
             corner[EAST], corner[WEST] = east[0] / span, west[0] / span
             corner[NORTH], corner[SOUTH] = north[0] / span, south[0] / span
-            corner[EAST + LOW :] = 0.0
+            for c in range(EAST + LOW, COLUMNS):
+                corner[c] = 0.0
             kept += 1
     return kept
