@@ -4,10 +4,16 @@ Work is skipped only on lower bounds that hold after rounding, and among equal d
 so the answer is the same bit for bit with or without the tree and whatever bound the search starts from. Meshes that
 fit in one leaf are a scan as they are; from 8 triangles on the walk was measured to win.
 
-Bounds. The box of a node lies in the ball around its centre C with radius rho = |half widths|. With theta the angle of
-C to the axis, f(C) = |C| sin(h - theta) is positive inside the cone, and changes by no more than the way a point moves:
-no point of the ball is in the cone when f(C) < -rho. Behind a cone of at most 180 deg the apex is nearest: none when
-theta > h + 90 deg and |C| > rho. And no point of the box is nearer than the box itself.
+Bounds. f(x) = |x| sin(h - theta), theta the angle of x to the axis, is positive inside the cone, and changes by no more
+than the way a point moves.
+Node: its box lies in the ball around its centre C with radius rho = |half widths|: no point is in the cone when
+f(C) < -rho, nor, for h <= 90 deg, when theta > h + 90 deg and |C| > rho (the apex is nearest), nor nearer than the
+box itself.
+Triangle: a point x = sum l_i c_i of the corners has |x|^2 = sum l_i |c_i|^2 - sum_{i<j} l_i l_j |c_i - c_j|^2, so
+|x|^2 >= min |c_i|^2 - L^2 / 3 with L the longest edge. Above 90 deg f is convex, hence largest on a corner. Below, f is
+a linear function minus cos h times the distance to the axis, whose curvature is at most 1 / (that distance), so f
+exceeds its largest corner value by at most cos h (L^2 / 3) / (2 distance), and by at most the way to the nearest
+corner, L / sqrt 3.
 """
 
 from __future__ import annotations
@@ -20,7 +26,7 @@ from numpy.typing import NDArray
 from replay.geometry.tree import Tree
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import EPSILON, Cone, closest_on_triangle
-from replay.sensing.distance.vectors import Vector, cross, dot, norm
+from replay.sensing.distance.vectors import Vector, cross, dot, norm, subtract
 
 Array = NDArray[np.float64]
 
@@ -64,6 +70,39 @@ def _node_bound(tree: Tree, node: int, apex: Vector, cone: Cone, slack: float) -
         return np.inf
     gx, gy, gz = max(abs(centre[0]) - hx, 0.0), max(abs(centre[1]) - hy, 0.0), max(abs(centre[2]) - hz, 0.0)
     return math.sqrt(gx * gx + gy * gy + gz * gz) - slack
+
+
+@kernel
+def _cannot_win(triangles: Array, k: int, apex: Vector, cone: Cone, limit: float, slack: float) -> bool:
+    """Return whether triangle k certainly has no point in the cone within the limit; cheap, from its corners alone."""
+    t = triangles[k]
+    a = (t[0, 0] - apex[0], t[0, 1] - apex[1], t[0, 2] - apex[2])
+    b = (t[1, 0] - apex[0], t[1, 1] - apex[1], t[1, 2] - apex[2])
+    c = (t[2, 0] - apex[0], t[2, 1] - apex[1], t[2, 2] - apex[2])
+    ab, bc, ca = subtract(b, a), subtract(c, b), subtract(a, c)
+    aa, bb, cc = dot(a, a), dot(b, b), dot(c, c)
+    sag = max(dot(ab, ab), dot(bc, bc), dot(ca, ca)) / 3.0
+    allowed = limit + slack
+    if min(aa, bb, cc) - sag - 16.0 * EPSILON * max(aa, bb, cc) > allowed * allowed:
+        return True
+    v = (cone.vx, cone.vy, cone.vz)
+    along_a, along_b, along_c = dot(a, v), dot(b, v), dot(c, v)
+    across_a, across_b, across_c = norm(cross(v, a)), norm(cross(v, b)), norm(cross(v, c))
+    inside = max(
+        along_a * cone.sin_half - across_a * cone.cos_half,
+        along_b * cone.sin_half - across_b * cone.cos_half,
+        along_c * cone.sin_half - across_c * cone.cos_half,
+    )
+    if inside >= -slack:
+        return False
+    if cone.cos_half <= 0.0:
+        return True
+    reach = math.sqrt(sag)
+    nearest_axis = min(across_a, across_b, across_c) - reach
+    margin = reach
+    if nearest_axis > 0.0:
+        margin = min(reach, 0.5 * sag * cone.cos_half / nearest_axis)
+    return inside < -margin - slack
 
 
 @kernel
@@ -125,7 +164,7 @@ def closest_in_tree(
             if second < 0:
                 for place in range(tree.begin[node], tree.end[node]):
                     k = tree.order[place]
-                    if k == start:
+                    if k == start or _cannot_win(triangles, k, apex, cone, limit, slack):
                         continue
                     distance, x, which = on_triangle(triangles, k, apex, cone)
                     if distance < limit or (distance == limit and (triangle < 0 or k < triangle)):

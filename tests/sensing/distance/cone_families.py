@@ -116,6 +116,35 @@ def spike(rng, n):
     return triangles, np.where(rng.uniform(size=(n, 1)) < 0.5, axes, aimed), apertures
 
 
+def sliver_conic(rng, n):
+    """Slivers of every width that hold the border point of their plane."""
+    triangles, _, apertures = _generic(rng, n)
+    normals = _normals(triangles)
+    normals *= np.sign(np.sum(normals * triangles[:, 0], axis=1))[:, None]
+    t = rng.uniform(0.2, 0.8, size=(n, 1))
+    width = 10.0 ** rng.uniform(-12.0, -1.0, size=(n, 1))
+    triangles[:, 2] += (1.0 - width) * (triangles[:, 0] + t * (triangles[:, 1] - triangles[:, 0]) - triangles[:, 2])
+    border = _towards(_inner(rng, triangles, 0.3))
+    away = border - np.sum(border * normals, axis=1)[:, None] * normals
+    away = _towards(away - np.sum(away * border, axis=1)[:, None] * border)
+    half = 0.5 * apertures[:, None]
+    return triangles, _towards(np.cos(half) * border + np.sin(half) * away), apertures
+
+
+def tangent_edge(rng, n):
+    """Only one edge reaches into the cone, by 1e-7 to 1e-2 of it: the answer is known to 1e-16 / sqrt(that)."""
+    triangles, _, apertures = _generic(rng, n)
+    a, b = triangles[:, 0], triangles[:, 1]
+    m = _towards(np.cross(a, b))
+    t = rng.uniform(0.1, 0.9, size=(n, 1))
+    along = _towards(a + t * (b - a))
+    h = 0.5 * apertures
+    sine = np.sin(h) * (1.0 - 10.0 ** rng.uniform(-7.0, -2.0, size=n))
+    axes = np.sqrt(1.0 - sine * sine)[:, None] * along + sine[:, None] * m
+    triangles[:, 2] -= 2.0 * np.maximum(np.sum(triangles[:, 2] * m, axis=1), 0.0)[:, None] * m
+    return triangles, _towards(axes), apertures
+
+
 def degenerate(rng, n):
     triangles, axes, apertures = _generic(rng, n)
     kind = rng.integers(0, 4, size=n)
@@ -203,6 +232,8 @@ FAMILIES = {
         near_apex,
         sliver,
         spike,
+        sliver_conic,
+        tangent_edge,
         degenerate,
         foot_border,
         corner_border,

@@ -13,6 +13,7 @@ from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.sensing.distance import closest_in_cone
 from tests.sensing.distance.cone_families import FAMILIES
+from tests.sensing.distance.meshes import torus
 
 CASES = json.loads((Path(__file__).parents[2] / "data" / "cone.json").read_text())["cases"]
 CASE_NUMBERS = {"conic": 2}
@@ -94,6 +95,13 @@ def test_full_sphere_senses_everything():
         assert hit.distance == pytest.approx(np.linalg.norm(direction), rel=1e-15)
         rod = [[direction, 2.0 * direction, direction]]
         assert closest_in_cone(rod, [0, 0, 0], [0, 0, 1], 2.0 * math.pi).detected
+
+
+def test_a_body_entirely_inside_the_cone_reads_as_without_a_cone():
+    body = torus(24, 12)
+    inside = closest_in_cone(body, [0.3, 0.2, -4.0], [0, 0, 1], 1.2)
+    everywhere = closest_in_cone(body, [0.3, 0.2, -4.0], [0, 0, 1], 2.0 * math.pi)
+    assert (inside.distance, inside.triangle) == (everywhere.distance, everywhere.triangle)
 
 
 def test_half_space_is_closed():
