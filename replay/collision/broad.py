@@ -75,7 +75,13 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
         return spheres_meet(volumes.center[a], volumes.radius[a], volumes.center[b], volumes.radius[b], pose)
     if volumes.kind != AABB:
         return obbs_meet(
-            volumes.center[a], volumes.half[a], volumes.axes[a], volumes.center[b], volumes.half[b], volumes.axes[b], pose
+            volumes.center[a],
+            volumes.half[a],
+            volumes.axes[a],
+            volumes.center[b],
+            volumes.half[b],
+            volumes.axes[b],
+            pose,
         )
     # boxes along the world's axes, about a's origin: centres R c, half widths |R| w
     center_a, half_a, center_b, half_b = scratch[4, :3], scratch[5, :3], scratch[6, :3], scratch[7, :3]

@@ -54,7 +54,11 @@ def decide(
         seed[0, 0], seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
         for f in range(task.shape[0]):
             if task[f, p] == REPEAT:
-                level[f, p], clearance[f, p], undecided[f, p] = level[f - 1, p], clearance[f - 1, p], undecided[f - 1, p]
+                level[f, p], clearance[f, p], undecided[f, p] = (
+                    level[f - 1, p],
+                    clearance[f - 1, p],
+                    undecided[f - 1, p],
+                )
             if task[f, p] != RUN:
                 continue
             for i in range(3):

@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 import llvmlite
 import llvmlite.binding
 import numba
+from numba.core import config
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -97,9 +98,10 @@ def kernel(function: Function) -> Function:
     fast-math and no contraction (every operation rounds as IEEE 754 says), and division by zero gives inf or NaN as in
     NumPy: kernels decide by comparison before they divide.
     """
-    directory = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function)
     finally:
-        numba.config.CACHE_DIR = directory
+        config.CACHE_DIR = previous
+    return compiled  # type: ignore[no-any-return]
