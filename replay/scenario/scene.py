@@ -24,7 +24,7 @@ from replay.scenario.model import Scenario
 from replay.scenario.names import matches
 from replay.scenario.script import linkage, script, transform
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
-from replay.sensing.capacitive import CapacitiveSensor, Plate
+from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
 from replay.sensing.distance import DistanceSensor
 from replay.sensing.target import Target, make_target
 
