@@ -37,14 +37,13 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
         root: the text's tree.
         model: the model.
     """
-    problems: list[Problem] = []
+    problems: dict[str, Problem] = {}
     for detail in error.errors(include_url=False, include_input=False):
         if detail["type"] == "too_short" and _long_enough(detail, root, model):
             continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)
-        if str(problem) not in {str(other) for other in problems}:
-            problems.append(problem)
-    return problems
+        problems.setdefault(str(problem), problem)
+    return list(problems.values())
 
 
 def _long_enough(detail: Any, root: Node, model: type[BaseModel]) -> bool:
@@ -74,10 +73,10 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
         return problem_at(root, (*path, *context.get("at", ())), context["rule"])
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag(kind, context, path, root)
-    return problem_at(root, path, _rule(kind, context, find(root, path)))
+    return problem_at(root, path, _rule(kind, context, detail["msg"], find(root, path)))
 
 
-def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
+def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -> str:
     match kind:
         case "string_type":
             scalar = node is not None and not isinstance(node.value, dict | list | None)
@@ -108,7 +107,7 @@ def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
         case "less_than_equal":
             return f"must be at most {context['le']}"
         case _:
-            raise AssertionError(f"an error of the kind {kind!r} has no words yet")
+            return f"is not valid: {message}"
 
 
 def _pattern_of(annotation: Any) -> str:
