@@ -213,6 +213,7 @@ def test_sphere_of_large_sets() -> None:
     assert ball.radius == pytest.approx(brute_force_radius(touching[:6]), rel=1e-9)
 
 
+@settings(max_examples=100, deadline=None)
 @given(st.integers(1, 50), st.integers(0, 2**32), st.floats(-6, 6), st.floats(0, 1e6))
 def test_aabb(count: int, seed: int, exponent: float, far: float) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * 10.0**exponent + far
