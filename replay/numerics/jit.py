@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite
 import llvmlite.binding
@@ -98,10 +98,10 @@ def kernel(function: Function) -> Function:
     fast-math and no contraction (every operation rounds as IEEE 754 says), and division by zero gives inf or NaN as in
     NumPy: kernels decide by comparison before they divide.
     """
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_directory())
+    settings: Any = config  # numba fills this module at run time
+    previous = settings.CACHE_DIR
+    settings.CACHE_DIR = str(cache_directory())
     try:
-        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function)
+        return cast(Function, numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function))
     finally:
-        config.CACHE_DIR = previous
-    return compiled  # type: ignore[no-any-return]
+        settings.CACHE_DIR = previous
