@@ -1,6 +1,6 @@
 """The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
 
-The tree is walked from the root. A node (or triangle) of area A whose own rigorous error bound E fits the budget is
+The tree is walked from the root. A node (or triangle) of area A whose own error bound E fits the budget is
 summed at once, else it is opened; a triangle that does not fit is integrated in closed form. The budget is one: every
 node that has been summed brought rtol x its own lower bound A/(r + h) and took E, and the rest is left for the nodes to
 come. So the sum of all E never exceeds rtol times a lower bound of the sum, and the result meets rtol.
@@ -15,10 +15,11 @@ h the largest distance of a corner from the centroid, d a point's place about it
   E = A spread4 h / (r^6 (1 - x)), spread4 the mean of |d|^4.
 - Part of it may lie over a border, by at most w: there 1/dist is expanded in the wrong region's form, whose squared
   distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3), mean(w^2) <= min(largest w^2, variance across the
-  border). Nothing is clipped: that error is far below what the border's curvature jump seems to cost.
-- A single triangle: 1 point, E = A spread2/(r - h)^3, borders or not (|Hessian of 1/dist| <= 2/dist^3); 3 points of
-  degree 2, E = 1.5 A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = 2 A h^4 spread2/(r^7 (1 - x)); 16 points of
-  degree 8, E = 2 A h^7 spread2/(r^10 (1 - x)); all but the first plus the border's term.
+  border). No cluster is clipped for it.
+- A single triangle takes the first that fits of: 1 point, E = A spread2/(r - h)^3, borders or not, as the Hessian of
+  1/dist is at most 2/dist^3; 3 points of degree 2, E = c A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4
+  spread2/(r^7 (1 - x)); 16 points of degree 8, E = c A h^7 spread2/(r^10 (1 - x)); all but the first plus the border's
+  term; c as measured, see `triangle_rules`. Where the border's term is in the way, the triangle is cut.
 """
 
 from __future__ import annotations
