@@ -78,7 +78,8 @@ class NarrowPhase(Protocol):
         clearance: Floats,
         undecided: NDArray[np.bool_],
         counts: Integers,
-    ) -> None: ...
+    ) -> None:
+        """Finish level, clearance and undecided where task asks for it."""
 
 
 class CollisionPipeline:
@@ -139,10 +140,17 @@ class CollisionPipeline:
     def run(self, poses: LinkPoses) -> CollisionColumns:
         """Return the columns of a block of n frames; they depend on no other block.
 
+        Raises:
+            InvalidValue: a pose is not finite.
+
         Accuracy: a clearance is right to 1e-12 of itself plus 1e-14 of the bodies' reach and offset
         (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does.
         """
         n, count = len(poses.local), len(self.pairs)
+        if not np.isfinite(poses.local).all():
+            frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
+            place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
+            raise InvalidValue(place, poses.local[frame, link].tolist(), "link poses must be finite")
         self.counters.pair_frames += n * count
         columns = _empty(n, count)
         moving = np.flatnonzero(~self._static)
