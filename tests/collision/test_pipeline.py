@@ -7,6 +7,7 @@ from replay.collision.columns import Level
 from replay.collision.gjk import distance
 from replay.collision.pairs import CollisionBody, Pair
 from replay.collision.pipeline import CollisionPipeline
+from replay.collision.relative import RelativePoses
 from replay.errors import InvalidValue
 from replay.geometry.containment import contains
 from replay.geometry.primitives import arc, cube, cuboid, cylinder, plane, sphere
@@ -238,6 +239,19 @@ def test_poses_must_be_finite(narrowphase):
     with pytest.raises(InvalidValue) as caught:
         scenes.run((cube(1.0), cube(1.0)), poses, narrowphase=narrowphase)
     assert caught.value.name == "poses.local[2, l001]"
+
+
+def test_relative_poses_are_those_of_the_linkage():
+    rng = np.random.default_rng(12)
+    joint = JointType.FREE
+    parents = [None, "l0", "l1", "l0", None, "l4", "l5", "l6"]
+    links = [Link(f"l{k}", up, motions.random_pose(rng), Joint(f"j{k}", joint)) for k, up in enumerate(parents)]
+    linkage = Linkage(links)
+    poses = linkage.forward(np.zeros((7, 0)), drift(rng, 7, 8, 1.0))
+    pairs = [(a, b) for a in range(8) for b in range(8)]
+    relative = RelativePoses(linkage, pairs).of(poses.local)
+    for q, (a, b) in enumerate(pairs):
+        assert (relative[q] == poses.relative(a, b)).all()
 
 
 def test_no_pairs_no_frames():
