@@ -103,6 +103,11 @@ class McapLog:
         """Return an attachment's bytes."""
         return self._bytes_at(attachment.begin, attachment.size)
 
+    def schema_name(self, channel: Channel) -> str:
+        """Return the name of a channel's message type, "" when it has none."""
+        schema = self.schemas.get(channel.schema_id)
+        return schema.name if schema else ""
+
     def count_of(self, channel: int) -> int | None:
         """Return how many messages a channel has by the statistics; None without them or in a salvaged file.
 
