@@ -57,7 +57,8 @@ def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
         x = pose[i, 0] * c[0] + pose[i, 1] * c[1] + pose[i, 2] * c[2] + pose[i, 3] - o[i]
         square += x * x
         size += abs(pose[i, 3]) + abs(c[i]) + abs(o[i])
-    return math.sqrt(square) - volumes.radius[a] - volumes.radius[b] - _SLACK * size
+    gap: float = math.sqrt(square) - volumes.radius[a] - volumes.radius[b] - _SLACK * size
+    return gap
 
 
 @kernel
@@ -75,7 +76,13 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
         return spheres_meet(volumes.center[a], volumes.radius[a], volumes.center[b], volumes.radius[b], pose)
     if volumes.kind != AABB:
         return obbs_meet(
-            volumes.center[a], volumes.half[a], volumes.axes[a], volumes.center[b], volumes.half[b], volumes.axes[b], pose
+            volumes.center[a],
+            volumes.half[a],
+            volumes.axes[a],
+            volumes.center[b],
+            volumes.half[b],
+            volumes.axes[b],
+            pose,
         )
     # boxes along the world's axes, about a's origin: centres R c, half widths |R| w
     center_a, half_a, center_b, half_b = scratch[4, :3], scratch[5, :3], scratch[6, :3], scratch[7, :3]
@@ -130,11 +137,11 @@ def sieve(
                 level[f, p], task[f, p] = 0, SKIP
             continue
         for f in range(n):
-            if f > 0 and _same(poses[q, f], poses[q, f - 1]):
-                if volumes.kind != AABB or _same(turns[link, f], turns[link, f - 1]):
-                    counts[BY_REPEAT] += 1
-                    level[f, p], task[f, p] = level[f - 1, p], REPEAT
-                    continue
+            repeats = f > 0 and _same(poses[q, f], poses[q, f - 1])
+            if repeats and (volumes.kind != AABB or _same(turns[link, f], turns[link, f - 1])):
+                counts[BY_REPEAT] += 1
+                level[f, p], task[f, p] = level[f - 1, p], REPEAT
+                continue
             level[f, p], task[f, p] = 0, SKIP
             if sphere_gap(volumes, a, b, poses[q, f]) > limit:
                 counts[BY_SPHERE] += 1

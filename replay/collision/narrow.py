@@ -19,8 +19,8 @@ Flags = NDArray[np.bool_]
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
-"""Rows of the counters after those of `traversal`: pair-frames looked at, contacts found by containment alone, contacts,
-and pair-frames that stayed undecided."""
+"""Rows of the counters after those of `traversal`: pair-frames looked at, contacts found by containment alone,
+contacts, and pair-frames that stayed undecided."""
 
 
 @kernel
@@ -54,7 +54,11 @@ def decide(
         seed[0, 0], seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
         for f in range(task.shape[0]):
             if task[f, p] == REPEAT:
-                level[f, p], clearance[f, p], undecided[f, p] = level[f - 1, p], clearance[f - 1, p], undecided[f - 1, p]
+                level[f, p], clearance[f, p], undecided[f, p] = (
+                    level[f - 1, p],
+                    clearance[f - 1, p],
+                    undecided[f - 1, p],
+                )
             if task[f, p] != RUN:
                 continue
             for i in range(3):

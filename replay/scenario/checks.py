@@ -41,14 +41,7 @@ def _links(names: Names) -> Iterator[Finding]:
             yield ("links", link), "must have another name: 'world' is the frame that all links stand in"
         if parent is not None and parent not in names.parents:
             yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"
-    in_cycle: set[str] = set()
-    for link in names.parents:
-        chain = [link]
-        while (parent := names.parents.get(chain[-1])) is not None and parent not in chain:
-            chain.append(parent)
-        if parent == link and link not in in_cycle:
-            in_cycle.update(chain)
-            yield ("links", link, "parent"), f"makes a circle: {' -> '.join([*chain, link])}; parents must form trees"
+    yield from _circles(names.parents)
     first: dict[str, JointName] = {}
     for joint in names.joints:
         if joint.type == "fixed":
@@ -57,6 +50,22 @@ def _links(names: Names) -> Iterator[Finding]:
         if other is not joint:
             where = ("links", joint.link, "joint", "name")
             yield where, f"names this joint {joint.name!r} like that of link {other.link!r}; joint names are unique"
+
+
+def _circles(parents: dict[str, str | None]) -> Iterator[Finding]:
+    """Find links that are their own ancestors, each circle once."""
+    settled: set[str] = set()
+    for link in parents:
+        chain: dict[str, None] = {}
+        above: str | None = link
+        while above is not None and above not in settled and above not in chain:
+            chain[above] = None
+            above = parents.get(above)
+        settled.update(chain)
+        if above is not None and above in chain:
+            circle = list(chain)[list(chain).index(above) :]
+            shown = " -> ".join([*circle[:10], *(["..."] if len(circle) > 10 else []), above])
+            yield ("links", above, "parent"), f"makes a circle: {shown}; parents must form trees"
 
 
 def _motion(names: Names) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from replay.scenario.fields import Flag, Name, Part, Placement, rejected
+from replay.scenario.fields import Flag, Name, Part, Placement, Vector, rejected
 from replay.scenario.units import JointAcceleration, JointPosition, JointVelocity, Share, Time
 
 SHORTEST = 1e-9
@@ -49,6 +49,8 @@ class Move(Part):
 class Keyframe(Placement):
     """Pose of a free link in its joint's frame at one time; between key frames position is linear, rotation slerp."""
 
+    xyz: Vector
+    """Position [m]."""
     time: Time
     """[s] from the scenario's start."""
 

@@ -37,14 +37,13 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
         root: the text's tree.
         model: the model.
     """
-    problems: list[Problem] = []
+    problems: dict[str, Problem] = {}
     for detail in error.errors(include_url=False, include_input=False):
         if detail["type"] == "too_short" and _long_enough(detail, root, model):
             continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)
-        if str(problem) not in {str(other) for other in problems}:
-            problems.append(problem)
-    return problems
+        problems.setdefault(str(problem), problem)
+    return list(problems.values())
 
 
 def _long_enough(detail: Any, root: Node, model: type[BaseModel]) -> bool:

@@ -24,7 +24,7 @@ from replay.scenario.model import Scenario
 from replay.scenario.names import matches
 from replay.scenario.script import linkage, script, transform
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
-from replay.sensing.capacitive import CapacitiveSensor, Plate
+from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
 from replay.sensing.distance import DistanceSensor
 from replay.sensing.target import Target, make_target
 
@@ -166,7 +166,9 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     found = []
 
     def mesh(link: str, name: str, shape: shapes.Mesh) -> Solid:
-        file = scenario.provenance.meshes[link, name]
+        file = scenario.provenance.meshes.get((link, name))
+        if file is None:
+            raise MeshError(shape.file, "is not at hand: scenarios with meshes come from `load` or `load_sources`")
         if (file, shape.scale) not in meshes:
             meshes[file, shape.scale] = load_mesh(file, scale=shape.scale, data=scenario.sources[file])
         solid = meshes[file, shape.scale]

@@ -20,7 +20,7 @@ _PI = Fraction(31415926535897932384626433832795028841971693993751058209749446, 1
 _DEGREE = _PI / 180
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Dimension:
     """A physical dimension with the units it may be written in.
 
@@ -33,7 +33,7 @@ class Dimension:
 
     name: str
     si: str
-    units: dict[str, Fraction] = field(repr=False)
+    units: dict[str, Fraction] = field(repr=False, compare=False)
     example: str = field(repr=False)
 
     @property

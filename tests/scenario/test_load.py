@@ -1,5 +1,6 @@
 """Loading scenarios: what is read, and every line said of what is wrong."""
 
+import pickle
 import subprocess
 import sys
 from fractions import Fraction
@@ -74,6 +75,14 @@ def test_a_loaded_scenario_loads_again_from_its_own_sources():
         "meshes/wedge.stl",
         "package://pyskindose/phantom_data/adult_male_reduced_1000t.stl",
     }
+
+
+def test_a_scenario_travels_to_another_process():
+    scenario = load(FULL)
+    again = pickle.loads(pickle.dumps(scenario))
+    assert again == scenario
+    assert again.sources == scenario.sources
+    assert again.provenance.place(("rate",)) == scenario.provenance.place(("rate",))
 
 
 def test_loading_imports_nothing_heavy():

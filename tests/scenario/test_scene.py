@@ -9,6 +9,7 @@ from replay.errors import ScenarioError
 from replay.kinematics.motion import sample
 from replay.scenario import scene as scene_module
 from replay.scenario.load import load, load_model, load_sources
+from replay.scenario.model import Scenario
 from replay.scenario.scene import build
 from replay.simulation import Layout
 
@@ -122,6 +123,13 @@ def test_every_mesh_that_cannot_be_used_is_told_with_its_place():
         build_text(f"links:\n  a: {{shapes: {{s: {mesh}}}}}\n  b: {{shapes: {{s: {mesh}}}}}\n", w=b"solid nothing\n")
     assert len(caught.value.problems) == 2
     assert str(caught.value).startswith("f.yaml:6:38: links.a.shapes.s.file = 'w.stl' cannot be used: ")
+
+
+def test_a_mesh_without_its_file_is_refused():
+    mesh = {"type": "mesh", "file": "w.stl", "scale": 1}
+    data = {"version": 1, "name": "a", "rate": 1, "duration": 1, "links": {"a": {"shapes": {"s": mesh}}}}
+    with pytest.raises(ScenarioError, match=r"links\.a\.shapes\.s\.file cannot be used: is not at hand"):
+        build(Scenario.model_validate(data))
 
 
 def test_notes_on_meshes_name_the_file():
