@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from replay.errors import InvalidValue, MeshError
 from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.solid import Solid, signed_volume
+from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
 from replay.numerics.jit import kernel
 
 Array = NDArray[np.float64]
@@ -167,19 +168,38 @@ def _is_convex(triangles: Array) -> bool:
     """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane."""
     local, _, scale = to_unit_box(triangles.reshape(-1, 3))
     slack = _FILE_ROUNDING * float(np.max(np.abs(triangles))) / scale
-    return bool(_all_below(local.reshape(-1, 3, 3), _convex_corners(local.reshape(-1, 3, 3)), slack))
+    corners = _convex_corners(local.reshape(-1, 3, 3))
+    return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
 
 
 @kernel
-def _all_below(triangles: Array, points: Array, slack: float) -> bool:
-    """Return whether no point is further than slack outside the plane of any triangle (all of some area)."""
+def _all_below(triangles: Array, points: Array, tree: Tree, slack: float) -> bool:
+    """Return whether no point is further than slack outside the plane of any triangle (all of some area).
+
+    Of a box of points, no point is further out than the corner that is furthest along the normal.
+    """
+    waiting = np.empty(MAX_DEPTH, np.int64)
     for t in range(len(triangles)):
-        ax, ay, az = triangles[t, 0]
+        ax, ay, az = triangles[t, 0, 0], triangles[t, 0, 1], triangles[t, 0, 2]
         ux, uy, uz = triangles[t, 1, 0] - ax, triangles[t, 1, 1] - ay, triangles[t, 1, 2] - az
         vx, vy, vz = triangles[t, 2, 0] - ax, triangles[t, 2, 1] - ay, triangles[t, 2, 2] - az
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         limit = slack * np.sqrt(nx * nx + ny * ny + nz * nz)
-        for k in range(len(points)):
-            if nx * (points[k, 0] - ax) + ny * (points[k, 1] - ay) + nz * (points[k, 2] - az) > limit:
-                return False
+        waiting[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            node = waiting[size]
+            low, high = tree.lower[node], tree.upper[node]
+            x, y, z = high[0] if nx > 0.0 else low[0], high[1] if ny > 0.0 else low[1], high[2] if nz > 0.0 else low[2]
+            if nx * (x - ax) + ny * (y - ay) + nz * (z - az) <= limit:
+                continue
+            if tree.second[node] >= 0:
+                waiting[size], waiting[size + 1] = tree.second[node], node + 1
+                size += 2
+                continue
+            for k in range(tree.begin[node], tree.end[node]):
+                p = points[tree.order[k]]
+                if nx * (p[0] - ax) + ny * (p[1] - ay) + nz * (p[2] - az) > limit:
+                    return False
     return True
