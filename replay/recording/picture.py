@@ -19,7 +19,7 @@ from replay.recording.blueprint import TIMELINE
 
 _STARTUP = 60.0  # [s] until the viewer must answer
 _LOADING = 60.0  # [s] until the picture must have come to rest
-_TOASTS = 7.0  # [s] the viewer's own notices stand over the picture when it starts
+_TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
 
 
