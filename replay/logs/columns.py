@@ -39,8 +39,10 @@ class Topic:
     messages: tuple[Message, ...] | None
 
 
-def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str, Topic]:
-    """Return topics of a log (all when None) in one pass over its chunks.
+def read_topics(
+    log: McapLog, topics: Collection[str] | None = None, *, as_messages: Collection[str] = ()
+) -> dict[str, Topic]:
+    """Return topics of a log (all when None) in one pass over its chunks; those in `as_messages` message by message.
 
     Raises:
         RecordingError: damage, a topic that is not protobuf, a message that its schema does not describe, or a
@@ -51,6 +53,9 @@ def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str
         for channel in sorted(log.channels.values(), key=lambda channel: channel.topic)
         if topics is None or channel.topic in topics
     }
+    for reader in wanted.values():
+        if reader.name in as_messages:
+            reader.restart()
     _pass(log, wanted)
     irregular = {channel: reader for channel, reader in wanted.items() if not reader.regular}
     for reader in irregular.values():
@@ -79,10 +84,11 @@ class _Reader:
         self.regular = True
         self._log = log
         self._channel = log.channels[channel]
+        self.name = self._channel.topic
         self._file = str(log.path)
         schema = log.schemas.get(self._channel.schema_id)
         if self._channel.encoding != "protobuf" or schema is None or schema.encoding != "protobuf":
-            raise RecordingError(self._file, f"topic {self._channel.topic!r} is not protobuf with a schema")
+            raise RecordingError(self._file, f"topic {self.name!r} is not protobuf with a schema")
         self._schema = schema
         self._type = message_type(self._file, schema.name, schema.data)
         self.restart()
@@ -111,13 +117,13 @@ class _Reader:
         expected = self._log.message_counts
         if expected is not None and self._log.loss is None and expected.get(self._channel.id, 0) != count:
             raise RecordingError(
-                self._file, f"damaged: topic {self._channel.topic!r} holds {count} messages, not as many as counted"
+                self._file, f"damaged: topic {self.name!r} holds {count} messages, not as many as counted"
             )
         time = np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
         columns = {path: np.concatenate(parts) for path, parts in self._columns.items()}
         texts = self._shape.texts if self._shape else {}
         messages = tuple(self._messages) if self._decoding else None
-        return Topic(self._channel.topic, self._schema.name, time, columns, texts, messages)
+        return Topic(self.name, self._schema.name, time, columns, texts, messages)
 
     def _add_rows(self, run: Run) -> bool:
         if run.rows is None:
@@ -135,7 +141,7 @@ class _Reader:
             return self._type.FromString(data)
         except DecodeError as error:
             raise RecordingError(
-                self._file, f"topic {self._channel.topic!r} holds a message that its schema cannot read: {error}"
+                self._file, f"topic {self.name!r} holds a message that its schema cannot read: {error}"
             ) from None
 
 

@@ -229,7 +229,7 @@ class McapLog:
 
     def _statistics(self, content: bytes) -> None:
         cursor = Cursor(self._file, "the statistics", content)
-        cursor.take(8 + 2 + 4 + 4 + 4 + 8 + 8)
+        cursor.take(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8)
         end = cursor.unsigned(4) + cursor.at
         self.message_counts = {}
         while cursor.at < end:
