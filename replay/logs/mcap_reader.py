@@ -92,7 +92,11 @@ class McapLog:
         try:
             self._walk()
         except OSError as error:
+            self.close()
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
+        except BaseException:
+            self.close()
+            raise
 
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
@@ -194,6 +198,8 @@ class McapLog:
             if name == PREAMBLE:
                 self._check_crc(int(values.get("crc32", "")) if values.get("crc32", "").isdecimal() else -1, crc, name)
             self.metadata.append((name, values))
+        elif self._salvage and op != Op.MESSAGE_INDEX:
+            raise self._damage(f"the record at byte {begin - RECORD_HEAD} is of an unknown kind")
 
     def _loose_message(self, begin: int, size: int) -> None:
         """Take messages outside chunks as an unpacked chunk without a checksum of its own."""
