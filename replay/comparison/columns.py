@@ -19,7 +19,7 @@ Indices = NDArray[np.int64]
 _BLOCK_VALUES = 1 << 20
 """Values that are compared at once while equal columns are looked for, which bounds the temporary memory to 16 MiB."""
 
-NANOSECONDS = 1e-9
+SECOND = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class MatchedFrames:
         return self._moment(self.candidate, index)
 
     def _moment(self, rows: Indices | None, index: int) -> result.Moment:
-        return result.Moment(int(index if rows is None else rows[index]), float(self.time[index]) * NANOSECONDS)
+        return result.Moment(int(index if rows is None else rows[index]), float(self.time[index]) / SECOND)
 
 
 Gates = dict[tuple[str, str, str], Flags]
@@ -169,6 +169,7 @@ def _compare_states(
     echo: Flags | None,
 ) -> dict[str, object] | None:
     kept = np.arange(len(x)) if echo is None else np.flatnonzero(~echo)
+    echoes = 0 if echo is None else int((x[echo] != y[echo]).sum())
     x, y = x[kept], y[kept]
     events: list[result.Event] = []
     count = outside = lone = 0
@@ -194,7 +195,7 @@ def _compare_states(
         "frames": len(differing),
         "outside": outside,
         "first": first or frames.baseline_moment(int(kept[differing[0]])),
-        "echo": 0 if echo is None else int(echo.sum()),
+        "echo": echoes,
         "events": tuple(events[: result.LISTED_EVENTS]),
         "event_count": count,
         "lone_events": lone,
@@ -220,12 +221,8 @@ class _Shifts:
         nanoseconds = frames.time[to] - frames.time[from_]
         count = np.abs(to - from_)
         # a rule's time is a decimal, a frame's time an integer: half a nanosecond decides for the rule
-        allowed = paired & (
-            (np.abs(nanoseconds) <= tolerance.time / NANOSECONDS + 0.5) | (count <= tolerance.frames)
-        )
-        if tolerance.time == 0.0:
-            allowed = paired & (count <= tolerance.frames)
-        return _Shifts(paired, nanoseconds * NANOSECONDS, to - from_, allowed)
+        allowed = paired & ((np.abs(nanoseconds) <= tolerance.time * SECOND + 0.5) | (count <= tolerance.frames))
+        return _Shifts(paired, nanoseconds / SECOND, to - from_, allowed)
 
 
 def _listed(
