@@ -43,7 +43,7 @@ def compare(
         added: what only the candidate's schemas have; told with the provenance.
     """
     rules = rules or Rules()
-    frames, matched = _match_frames(baseline.time, candidate.time, rules)
+    frames, matched = match_frames(baseline.time, candidate.time, rules)
     groups_a = {group.key: group for group in groups(baseline)}
     groups_b = {group.key: group for group in groups(candidate)}
     gates: Gates = {}
@@ -96,9 +96,10 @@ def _deciding_names(found: Difference) -> Iterator[str]:
         yield FRAMES
 
 
-def _match_frames(
+def match_frames(
     a: NDArray[np.int64], b: NDArray[np.int64], rules: Rules
 ) -> tuple[Frames, MatchedFrames]:
+    """Return which frames two runs have in common, by integer nanoseconds, and what there is to say of the others."""
     if np.array_equal(a, b):
         return Frames(matched=len(a)), MatchedFrames(a, None, None)
     time, rows_a, rows_b = np.intersect1d(a, b, assume_unique=True, return_indices=True)

@@ -17,25 +17,24 @@ _TEXTS = (".yaml", ".yml")
 
 
 def provenance_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
-    """Return what the recordings say of themselves that differs: versions, code, model, libraries and input files.
+    """Return what the recordings say of themselves that differs: versions, code, model, libraries and scenario texts.
 
-    The names behind the columns are not part of it: they are compared as signals.
+    The names behind the columns are not part of it: they are compared as signals. Bodies are part of the scene.
     """
     return _changes(_flat(baseline), _flat(candidate))
 
 
 def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
     """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same."""
-    a, b = _bodies(baseline), _bodies(candidate)
-    return _changes(a, b)
+    return _changes(_bodies(baseline), _bodies(candidate))
 
 
 def _bodies(provenance: Provenance) -> dict[str, str]:
-    return {
-        FILES + name: f"sha256 {digest}"
-        for name, digest in provenance.files.items()
-        if PurePosixPath(name).suffix.lower() not in _TEXTS
-    }
+    return {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if not _is_text(name)}
+
+
+def _is_text(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in _TEXTS
 
 
 def _changes(a: Mapping[str, str], b: Mapping[str, str]) -> tuple[Change, ...]:
@@ -49,8 +48,8 @@ def _flat(provenance: Provenance) -> dict[str, str]:
         for field in dataclasses.fields(provenance)
         if field.name not in ("layout", "files")
     }
-    files = {f"file {name}": f"sha256 {digest}" for name, digest in provenance.files.items()}
-    return {**dict(_leaves(values, "")), **files}
+    texts = {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if _is_text(name)}
+    return {**dict(_leaves(values, "")), **texts}
 
 
 def _leaves(value: Any, name: str) -> Iterator[tuple[str, str]]:
