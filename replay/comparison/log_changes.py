@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
@@ -73,14 +74,26 @@ def _changes(prefix: str, a: Mapping[str, str], b: Mapping[str, str]) -> Iterato
             yield Change(f"{prefix}{name}", a.get(name), b.get(name))
 
 
-def _bodies(log: McapLog) -> dict[str, str]:
+def read_scene(path: Path) -> Any:
+    """Return the foxglove.SceneUpdate of a recording file, or None when there is no such file or no scene in it."""
+    if not path.is_file():
+        return None
+    with McapLog(path) as log:
+        return _scene(log)
+
+
+def _scene(log: McapLog) -> Any:
     channels = [channel.id for channel in log.channels.values() if channel.topic == SCENE]
     for chunk in log.chunks if channels else ():
         for run in log.runs(chunk):
             if run.channel in channels:
-                scene = messages.message_class(messages.SCENE).FromString(run.messages()[-1])
-                return {f"/{entity.id}": _described(entity) for entity in scene.entities}
-    return {}
+                return messages.message_class(messages.SCENE).FromString(run.messages()[-1])
+    return None
+
+
+def _bodies(log: McapLog) -> dict[str, str]:
+    scene = _scene(log)
+    return {} if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
 
 
 def _described(entity: Any) -> str:

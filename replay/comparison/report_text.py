@@ -63,8 +63,10 @@ def _signals(found: Difference, verbose: bool) -> Iterator[str]:
 
 def _details(item: SignalDifference, found: Difference, verbose: bool) -> Iterator[str]:
     yield from wording.signal(item, found.frames.matched, events=None if verbose else wording.SHOWN_EVENTS)
-    if verbose or item.rule is not None:
+    if verbose:
         yield wording.rule(item.rule)
+    elif item.rule is not None:
+        yield f"rule {wording.tolerance(item.rule)}"
 
 
 def _printable(line: str) -> str:

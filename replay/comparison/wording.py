@@ -16,7 +16,7 @@ from replay.comparison.difference import (
     SignalDifference,
     Worst,
 )
-from replay.comparison.rules import Rule
+from replay.comparison.rules import EXACT, Rule
 
 SHOWN_EVENTS = 5
 """Events of a signal in the short form."""
@@ -144,7 +144,17 @@ def rule(item: Rule | None) -> str:
         return "no rule: exact"
     link = f" ({item.link})" if item.link else ""
     until = f", until {item.expires.isoformat()}" if item.expires else ""
-    return f"{item.place or 'rule'}{until}: {item.reason.strip()}{link}"
+    return f"rule {tolerance(item)}{until}: {item.reason.strip()}{link}"
+
+
+def tolerance(item: Rule) -> str:
+    """Return what a rule accepts, and where it is written."""
+    default, given = EXACT, item.tolerance
+    parts = [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
+    parts += [f"time {seconds(given.time)}"] if given.time else []
+    parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
+    parts += [f"{key}: {getattr(given, key)}" for key in ("nan", "zero") if getattr(given, key) != getattr(default, key)]
+    return f"{', '.join(parts) or 'exact'}{f' ({item.place})' if item.place else ''}"
 
 
 def expired(item: Rule) -> str:
