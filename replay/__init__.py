@@ -29,7 +29,18 @@ _PUBLIC = {
     "diff": "replay.comparison.runs",
     "Difference": "replay.comparison.difference",
 }
-_ROOMS = ("errors", "numerics", "geometry", "kinematics", "collision", "sensing", "scenario", "recording", "simulation", "comparison")
+_ROOMS = (
+    "errors",
+    "numerics",
+    "geometry",
+    "kinematics",
+    "collision",
+    "sensing",
+    "scenario",
+    "recording",
+    "simulation",
+    "comparison",
+)
 
 __all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from replay.comparison import difference as result
 from replay.comparison.events import Matched, Track, match, tracks
 from replay.comparison.numbers import Errors, Flags, compare_numbers, compare_rotations
-from replay.comparison.rules import Rules, Tolerance
+from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.signals import Column, Field, Group, Kind, Signal, unify_categories
 
 Indices = NDArray[np.int64]
@@ -46,6 +47,9 @@ class MatchedFrames:
     def _moment(self, rows: Indices | None, index: int) -> result.Moment:
         return result.Moment(int(index if rows is None else rows[index]), float(self.time[index]) / SECOND)
 
+
+Finding = Callable[[Signal, Rule | None], result.SignalDifference]
+"""A difference that waits for the signal and the rule that it is told of."""
 
 Gates = dict[tuple[str, str, str], Flags]
 """By topic, field and name of a gate: the matched frames in which one run has a value and the other has none."""
@@ -82,7 +86,7 @@ def compare_groups(
             compare = compare_rotations if a.field.kind is Kind.ROTATION else compare_numbers
             found = _summarise(compare(x, y, tolerance), x, y, frames, echo, a.field.kind)
         if found is not None:
-            yield result.SignalDifference(signal=signal, rule=rule, **found)
+            yield found(signal, rule)
 
 
 def _changed(a: Column, b: Column, frames: MatchedFrames, columns_a: Indices, columns_b: Indices) -> Flags:
@@ -128,7 +132,7 @@ def _echo(gates: Mapping[tuple[str, str, str], Flags], signal: Signal, field: Fi
 
 def _summarise(
     errors: Errors, x: Column, y: Column, frames: MatchedFrames, echo: Flags | None, kind: Kind
-) -> dict[str, object] | None:
+) -> Finding | None:
     differs, outside = errors.differs | errors.outside, errors.outside
     echoes = 0
     if echo is not None:
@@ -146,17 +150,18 @@ def _summarise(
         values = (0.0, float(error[at])) if kind is Kind.ROTATION else (float(x[at]), float(y[at]))
         return result.Worst(float(error[at]), frames.baseline_moment(at), *values)
 
-    return {
-        "decides": bool(outside.any()),
-        "frames": int(differs.sum()),
-        "outside": int(outside.sum()),
-        "first": frames.baseline_moment(int(np.argmax(decisive))),
-        "worst_abs": worst(errors.error),
-        "worst_rel": worst(errors.relative),
-        "nan": int((errors.nan & outside).sum()),
-        "infinite": int((errors.infinite & outside).sum()),
-        "echo": echoes,
-    }
+    return partial(
+        result.SignalDifference,
+        decides=bool(outside.any()),
+        frames=int(differs.sum()),
+        outside=int(outside.sum()),
+        first=frames.baseline_moment(int(np.argmax(decisive))),
+        worst_abs=worst(errors.error),
+        worst_rel=worst(errors.relative),
+        nan=int((errors.nan & outside).sum()),
+        infinite=int((errors.infinite & outside).sum()),
+        echo=echoes,
+    )
 
 
 def _compare_states(
@@ -167,7 +172,7 @@ def _compare_states(
     frames: MatchedFrames,
     tolerance: Tolerance,
     echo: Flags | None,
-) -> dict[str, object] | None:
+) -> Finding | None:
     kept = np.arange(len(x)) if echo is None else np.flatnonzero(~echo)
     echoes = 0 if echo is None else int((x[echo] != y[echo]).sum())
     x, y = x[kept], y[kept]
@@ -190,18 +195,19 @@ def _compare_states(
     differing = np.flatnonzero(x != y)
     decisive = next((event for event in events if not event.allowed), None)
     first = None if decisive is None else decisive.baseline or decisive.candidate
-    return {
-        "decides": outside > 0,
-        "frames": len(differing),
-        "outside": outside,
-        "first": first or frames.baseline_moment(int(kept[differing[0]])),
-        "echo": echoes,
-        "events": tuple(events[: result.LISTED_EVENTS]),
-        "event_count": count,
-        "lone_events": lone,
-        "max_shift": max_shift,
-        "max_shift_frames": max_frames,
-    }
+    return partial(
+        result.SignalDifference,
+        decides=outside > 0,
+        frames=len(differing),
+        outside=outside,
+        first=first or frames.baseline_moment(int(kept[differing[0]])),
+        echo=echoes,
+        events=tuple(events[: result.LISTED_EVENTS]),
+        event_count=count,
+        lone_events=lone,
+        max_shift=max_shift,
+        max_shift_frames=max_frames,
+    )
 
 
 _START = result.Moment(0, 0.0)

@@ -96,9 +96,7 @@ def _deciding_names(found: Difference) -> Iterator[str]:
         yield FRAMES
 
 
-def match_frames(
-    a: NDArray[np.int64], b: NDArray[np.int64], rules: Rules
-) -> tuple[Frames, MatchedFrames]:
+def match_frames(a: NDArray[np.int64], b: NDArray[np.int64], rules: Rules) -> tuple[Frames, MatchedFrames]:
     """Return which frames two runs have in common, by integer nanoseconds, and what there is to say of the others."""
     if np.array_equal(a, b):
         return Frames(matched=len(a)), MatchedFrames(a, None, None)

@@ -205,7 +205,10 @@ class Difference:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Signal):
-        return {"full_name": value.full_name, **{key: getattr(value, key) for key in ("topic", "field", "name", "unit")}}
+        return {
+            "full_name": value.full_name,
+            **{key: getattr(value, key) for key in ("topic", "field", "name", "unit")},
+        }
     if isinstance(value, Rule):
         expires = None if value.expires is None else value.expires.isoformat()
         tolerance = dataclasses.asdict(value.tolerance)

@@ -1,4 +1,4 @@
-"""What two recording files say apart from their columns: scene, schemas, and whether their messages are the same bytes."""
+"""What two files say apart from their columns: scene, schemas, and whether their messages are the same bytes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.descriptor import FieldDescriptor
 
 from replay.comparison.difference import Change
 from replay.logs.mcap_reader import McapLog
@@ -113,7 +113,7 @@ def _fields(log: McapLog) -> dict[str, str]:
     return found
 
 
-def _flat(descriptor: Descriptor, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
+def _flat(descriptor: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
     for field in descriptor.fields:
         path = f"{prefix}{field.name}"
         yield path, f"field {field.number}, {_KINDS[field.type]}{' array' if field.is_repeated else ''}"

@@ -1,8 +1,8 @@
 """Two runs in one rerun recording: both scenes in two colours, their readings and differences over time, what differs.
 
-For people's eyes: the scene once as baseline (blue) and once as candidate (orange), curves of both for the signals that
-differ, the differences in charts of their own, and a log of moments: selecting a line jumps to it; the first is the first
-difference. The time selection spans what differs.
+For people's eyes: the scene once as baseline (blue) and once as candidate (orange), curves of both for the signals
+that differ, the differences in charts of their own, and a log of moments: selecting a line jumps to it, and the first
+line is the first difference. The time selection spans what differs.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from replay.recording.rerun_log import APPLICATION
 Color = tuple[int, int, int, int]
 
 BASELINE, CANDIDATE, DIFFERENCE = "baseline", "candidate", "difference"
-"""First parts of the entities: `/baseline/scene/arm/beam`, `/candidate/values/...`, `/difference/...`."""
+"""First parts of the entities: `/baseline/scene/arm/beam`, `/candidate/values/FIELD/SIGNAL`, `/difference/...`."""
 COLORS: dict[str, Color] = {BASELINE: (70, 150, 240, 110), CANDIDATE: (250, 140, 40, 110)}
 CURVES = 24
 """Signals that are drawn; those that decide come first."""
@@ -65,7 +65,8 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
     stream = rr.RecordingStream(APPLICATION)
     try:
         marks = sorted(_marks(case), key=lambda mark: mark.at.time)
-        stream.save(file.part, default_blueprint=_blueprint(marks))
+        shown = case.difference.signals[:CURVES]
+        stream.save(file.part, default_blueprint=_blueprint(marks, list(dict.fromkeys(map(_chart, shown)))))
         stream.send_recording_name(f"{case.name}: baseline and candidate")
         summary = text(RunDifference(str(case.baseline), str(case.candidate), (case,)), verbose=True)
         stream.log("summary", rr.TextDocument(summary), static=True)
@@ -74,7 +75,7 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
             _log_scene(stream, side, recording)
             _log_poses(stream, side, recording)
         curves = Curves(pair)
-        for item in case.difference.signals[:CURVES]:
+        for item in shown:
             _log_curve(stream, item, curves.curve(item), pair.baseline)
         _log_marks(stream, marks)
         stream.flush()
@@ -123,8 +124,9 @@ def _log_curve(stream: Any, item: SignalDifference, curve: Curve, baseline: Reco
     for side, column in values:
         if side != DIFFERENCE and item.signal.field == "rotation":
             continue
-        path = [side, "values", name] if side != DIFFERENCE else [side, name]
-        color = COLORS[side][:3] + (_OPAQUE,) if side in COLORS else None
+        chart = _chart(item)
+        path = [side, "values", chart, name] if side != DIFFERENCE else [side, chart, name]
+        color = (*COLORS[side][:3], _OPAQUE) if side in COLORS else None
         title = f"{side}: {name}{unit}" if side != DIFFERENCE else f"{name}{unit}"
         lines = rr.SeriesLines(names=title, colors=color, widths=3.0 if side == BASELINE else 1.5)
         stream.log(path, lines, static=True)
@@ -176,32 +178,48 @@ def _when(event: Event) -> Moment:
     return at
 
 
-def _blueprint(marks: list[_Mark]) -> Any:
+def _chart(item: SignalDifference) -> str:
+    """Return the chart that a signal is drawn in: one for each field, because a chart has one unit."""
+    unit = f" [{item.signal.unit}]" if item.signal.unit else ""
+    return f"{item.signal.topic.split('/')[1]} {item.signal.field}{unit}"
+
+
+def _charts(name: str) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
+    sides = [rr.new_entity_path([side, "values", name]) for side in (BASELINE, CANDIDATE)]
+    return rrb.Vertical(
+        rrb.TimeSeriesView(origin="/", contents=[f"+ {side}/**" for side in sides], name=name, plot_legend=legend),
+        rrb.TimeSeriesView(origin=rr.new_entity_path([DIFFERENCE, name]), name="difference", plot_legend=legend),
+        name=name,
+    )
+
+
+def _blueprint(marks: list[_Mark], charts: list[str]) -> Any:
     import rerun as rr
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
     scene = rrb.Spatial3DView(
-        origin="/", contents=[f"+ /{BASELINE}/scene/**", f"+ /{CANDIDATE}/scene/**"], name="Baseline blue, candidate orange"
+        origin="/",
+        contents=[f"+ /{BASELINE}/scene/**", f"+ /{CANDIDATE}/scene/**"],
+        name="Baseline blue, candidate orange",
     )
-    values = rrb.TimeSeriesView(
-        origin="/", contents=[f"+ /{BASELINE}/values/**", f"+ /{CANDIDATE}/values/**"], name="Values of what differs"
-    )
-    differences = rrb.TimeSeriesView(origin=f"/{DIFFERENCE}", name="Differences")
     moments = rrb.TextLogView(
         origin=f"/{DIFFERENCE}/moments",
         name="Moments",
         columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn(kind) for kind in ("LogLevel", "Body")]),
     )
-    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
-    selection = None
+    below = rrb.Tabs(moments, rrb.TextDocumentView(origin="/summary", name="Summary"), active_tab=0)
+    parts = [rrb.Tabs(*map(_charts, charts), active_tab=0)] if charts else []
+    selection: Any = None
     if marks:
-        begin, end = round(marks[0].at.time * 1e9), round(marks[-1].at.time * 1e9)
+        begin, end = (round(mark.at.time * 1e9) for mark in (marks[0], marks[-1]))
         selection = rr.encodings.AbsoluteTimeRange(min=begin, max=end)
     return rrb.Blueprint(
-        rrb.Horizontal(
-            scene, rrb.Vertical(values, differences, rrb.Tabs(moments, summary, active_tab=0)), column_shares=[3, 2]
-        ),
+        rrb.Horizontal(scene, rrb.Vertical(*parts, below, row_shares=[3, 2][-len(parts) - 1 :]), column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, time_selection=selection),

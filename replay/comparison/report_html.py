@@ -15,9 +15,7 @@ from replay.comparison.runs import RunDifference
 def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
     """Return the page; `plots` holds the drawings of each case, by its name."""
     cases = [(case, {plot.signal: plot for plot in plots.get(case.name, ())}) for case in found.cases]
-    page: str = _template("report.html.j2").render(
-        found=found, cases=cases, wording=wording, draw=draw, shown=SHOWN
-    )
+    page: str = _template("report.html.j2").render(found=found, cases=cases, wording=wording, draw=draw, shown=SHOWN)
     return page
 
 

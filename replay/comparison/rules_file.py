@@ -19,13 +19,13 @@ from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.scenario.fields import Flag, Part, Text, rejected
 from replay.scenario.problems import translate
 from replay.scenario.source import Folder, SourceRule, locate
-from replay.scenario.units import NUMBER, QUANTITY_KEY, Quantity, Time
+from replay.scenario.units import NUMBER, QUANTITY_KEY, TIME, Quantity
 from replay.scenario.yaml_text import Node, parse
 
 SCHEMA_FILE: Final = "rules.schema.json"
 
 _FRAMES = re.compile(r"\s*([0-9]{1,9})\s+frames?\s*")
-_TIME = Quantity("Time", Time.__metadata__[0].dimension, at_least=0.0)
+_TIME = Quantity("Time", TIME, at_least=0.0)
 
 
 @dataclass(frozen=True)

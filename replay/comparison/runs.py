@@ -33,12 +33,13 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One scenario of two runs."""
+    """One scenario of two runs; `of_folders` when they are run folders and not single files."""
 
     name: str
     baseline: Path
     candidate: Path
     difference: Difference
+    of_folders: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +118,9 @@ def diff(
 
         rules = read_rules(rules, today=today)
     if isinstance(baseline, Recording) or isinstance(candidate, Recording):
-        recordings = (x if isinstance(x, Recording) else read(x) for x in (baseline, candidate))
-        return diff_pair(Pair(*recordings), rules=rules, strict_provenance=strict_provenance)
+        a, b = (x if isinstance(x, Recording) else read(x) for x in (baseline, candidate))
+        pair = Pair(a, b)
+        return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
     return diff_pair(read_pair(baseline, candidate), rules=rules, strict_provenance=strict_provenance)
 
 
@@ -170,7 +172,9 @@ def diff_runs(
     rules = rules or Rules()
     folders = Path(baseline).is_dir(), Path(candidate).is_dir()
     if folders[0] != folders[1]:
-        raise InvalidValue("candidate", candidate, f"must be a {'folder' if folders[0] else 'file'}, as the baseline is")
+        raise InvalidValue(
+            "candidate", candidate, f"must be a {'folder' if folders[0] else 'file'}, as the baseline is"
+        )
     if folders[0]:
         a, b = _recordings(Path(baseline)), _recordings(Path(candidate))
     else:
@@ -179,7 +183,7 @@ def diff_runs(
     for name in sorted(a.keys() & b.keys()):
         pair = read_pair(a[name], b[name])
         found = diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
-        case = Case(name or found.name, a[name], b[name], found)
+        case = Case(name or found.name, a[name], b[name], found, of_folders=folders[0])
         if visit is not None:
             visit(case, pair)
         cases.append(case)

@@ -11,9 +11,10 @@ A signal is one scalar column: (topic, field, name). Its full name joins them wi
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,7 +69,7 @@ class Signal:
     topic: str
     field: str
     name: str = ""
-    unit: str = field(default="", compare=False)
+    unit: str = dataclasses.field(default="", compare=False)
 
     @property
     def full_name(self) -> str:
@@ -188,9 +189,7 @@ def _capacitive(recording: Recording) -> Iterator[Group]:
     yield Group(PER_OBJECT_FIELD, signals, columns.per_object.reshape(len(columns.per_object), len(signals)))
 
 
-def _signals(
-    topic: str, field_: Field, names: Sequence[str], units: Sequence[str] | None = None
-) -> tuple[Signal, ...]:
+def _signals(topic: str, field_: Field, names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Signal, ...]:
     return tuple(
         Signal(topic, field_.name, name, field_.unit if units is None else units[k]) for k, name in enumerate(names)
     )
@@ -215,4 +214,5 @@ def unify_categories(a: Group, b: Group) -> tuple[Column, Column, tuple[str, ...
 
 def _recode(group: Group, code: dict[str, int]) -> Column:
     table = np.array([code[text] for text in group.categories], dtype=np.int32)
-    return table[group.values + 1]
+    codes: Column = table[group.values + 1]
+    return codes

@@ -153,7 +153,9 @@ def tolerance(item: Rule) -> str:
     parts = [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
     parts += [f"time {seconds(given.time)}"] if given.time else []
     parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
-    parts += [f"{key}: {getattr(given, key)}" for key in ("nan", "zero") if getattr(given, key) != getattr(default, key)]
+    parts += [
+        f"{key}: {getattr(given, key)}" for key in ("nan", "zero") if getattr(given, key) != getattr(default, key)
+    ]
     return f"{', '.join(parts) or 'exact'}{f' ({item.place})' if item.place else ''}"
 
 
