@@ -226,8 +226,9 @@ class _Shifts:
         from_, to = kept[matched.baseline], kept[matched.candidate]
         nanoseconds = frames.time[to] - frames.time[from_]
         count = np.abs(to - from_)
-        # a rule's time is a decimal, a frame's time an integer: half a nanosecond decides for the rule
-        allowed = paired & ((np.abs(nanoseconds) <= tolerance.time * SECOND + 0.5) | (count <= tolerance.frames))
+        # two frames' times are rounded to nanoseconds: what lies between them is known to 1 ns
+        limit = tolerance.time * SECOND + 1.0 if tolerance.time > 0.0 else 0.0
+        allowed = paired & ((np.abs(nanoseconds) <= limit) | (count <= tolerance.frames))
         return _Shifts(paired, nanoseconds / SECOND, to - from_, allowed)
 
 
