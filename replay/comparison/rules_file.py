@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.scenario.fields import Flag, Part, Text, rejected
 from replay.scenario.problems import translate
 from replay.scenario.source import Folder, SourceRule, locate
-from replay.scenario.units import NUMBER, QUANTITY_KEY, TIME, Quantity
+from replay.scenario.units import TIME, Quantity
 from replay.scenario.yaml_text import Node, parse
 
 SCHEMA_FILE: Final = "rules.schema.json"
@@ -41,7 +42,15 @@ def _shift(value: object) -> Shift:
         found = _FRAMES.fullmatch(value)
         if found is not None:
             return Shift(frames=int(found[1]))
+        if "frame" in value:
+            raise rejected("must be a whole number of frames, such as '1 frame', or a time, such as '20 ms'")
     return Shift(seconds=float(_TIME.parse(value)))
+
+
+def _bound(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+        raise rejected("must be a number that is not negative, in the signal's SI unit")
+    return float(value)
 
 
 def _patterns(value: object) -> tuple[str, ...]:
@@ -81,7 +90,7 @@ _PATTERN_SCHEMA = {"type": "string", "pattern": r"^[/*]"}
 _PATTERNS_SCHEMA = {"anyOf": [_PATTERN_SCHEMA, {"type": "array", "items": _PATTERN_SCHEMA, "minItems": 1}]}
 _DAY_SCHEMA = {"type": "string", "pattern": r"^\d{4}-\d{2}-\d{2}$", "format": "date"}
 
-Bound = Annotated[float, Quantity("Bound", NUMBER, at_least=0.0)]
+Bound = Annotated[float, PlainValidator(_bound), WithJsonSchema({"type": "number", "minimum": 0})]
 
 
 class RuleText(Part):
@@ -179,9 +188,7 @@ def _tidy(schema: Any) -> Any:
         return [_tidy(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    kept = {key: value for key, value in schema.items() if key != QUANTITY_KEY}
-    if isinstance(kept.get("title"), str):
-        del kept["title"]
+    kept = {key: value for key, value in schema.items() if not (key == "title" and isinstance(value, str))}
     if isinstance(kept.get("default", 0), dict | None):
         del kept["default"]
     return {key: _tidy(value) for key, value in kept.items()}
