@@ -8,36 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.scenario.layout import Layout
 from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+
+__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout"]
 
 Floats = NDArray[np.float64]
 
 BLOCK_FRAMES = 256
 """Frames per block; recorded, because warm-start state resets at block starts."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The names behind the columns, each listed once and sorted.
-
-    Attributes:
-        links: L link names.
-        joints: J names of scalar joints; `joint_units` their units, "rad" or "m".
-        shapes: names "link/shape" of all shapes, for the distance sensor's `shape` column.
-        pairs: P names "link/shape|link/shape" of the pairs that are tested.
-        distance_sensors: D names.
-        capacitive_sensors: C names.
-        objects: O names of the shapes that capacitive sensors sense.
-    """
-
-    links: tuple[str, ...]
-    joints: tuple[str, ...]
-    joint_units: tuple[str, ...]
-    shapes: tuple[str, ...]
-    pairs: tuple[str, ...]
-    distance_sensors: tuple[str, ...]
-    capacitive_sensors: tuple[str, ...]
-    objects: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

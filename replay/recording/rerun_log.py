@@ -6,6 +6,7 @@ after it, as NaN, so that gaps stay gaps. The bytes differ from run to run; the 
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import Level
+from replay.errors import WriteError
 from replay.logs.part_file import PartFile
 from replay.numerics import transforms
 from replay.recording import blueprint
@@ -50,11 +52,14 @@ class RerunWriter:
         self._last: dict[str, Any] = {}
         self._curves: set[tuple[str, ...]] = set()
         self._members = self._bodies_of_pairs()
+        self._corners = np.zeros((0, 3))
+        self._end = 0
 
     def write(self, block: FrameBlock) -> None:
         """Append a block."""
         if self._stream is None:
             self._stream = self._begin(block)
+        self._end = int(block.time[-1])
         self._poses(block)
         self._colors(block)
         self._distance(block)
@@ -69,10 +74,13 @@ class RerunWriter:
         self._log_events(block)
 
     def close(self) -> None:
-        """Finish the recording and give the file its name."""
+        """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""
         if self._stream is not None:
+            charts = sorted({path[0] for path in self._curves})
+            self._stream.send_blueprint(blueprint.blueprint(charts, self._corners, self._end), make_active=False)
             self._stream.flush()
             self._stream.disconnect()
+            self._check_footer()
         self._file.commit()
 
     def discard(self) -> None:
@@ -85,15 +93,26 @@ class RerunWriter:
         import rerun as rr
 
         stream = rr.RecordingStream(APPLICATION)
-        plots = [blueprint.DISTANCE] if block.distance is not None else []
-        plots += [blueprint.CAPACITIVE] if block.capacitive is not None else []
-        plots += [blueprint.CLEARANCE] if block.collision is not None else []
-        corners = extent(self._scene, block.link_poses[0])
+        self._corners = extent(self._scene, block.link_poses[0])
         # The library opens the file that is already there anew, so that the name, its folder and its rights are proven.
-        stream.save(self._file.part, default_blueprint=blueprint.blueprint(plots, corners))
+        try:
+            stream.save(self._file.part)
+        except RuntimeError as error:
+            raise WriteError(str(self._file.path), str(error)) from None
         stream.send_recording_name(self._scene.name)
-        log_scene(stream, self._scene)
+        log_scene(stream, self._scene, self._members if block.collision is not None else ())
         return stream
+
+    def _check_footer(self) -> None:
+        """Read the end of the file back: the library only logs that a disk is full."""
+        from rerun.chunk import RrdReader
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                RrdReader(str(self._file.part)).recordings()
+        except Exception as error:  # a missing footer is a warning of its own class, damage any of several errors
+            raise WriteError(str(self._file.path), f"it did not reach the disk whole ({error})") from None
 
     def _send(self, block: FrameBlock, rows: Flags, path: list[str], *columns: Any) -> None:
         import rerun as rr
@@ -170,7 +189,7 @@ class RerunWriter:
                 lengths = shown.astype(np.int64)  # no strip at all while nothing is seen
                 strips = rr.LineStrips3D.columns(strips=ends[rows & seen]).partition(lengths)
                 points = rr.Points3D.columns(positions=ends[rows & seen][:, 1]).partition(lengths)
-                self._send(block, rows, [blueprint.SCENE, "closest points", name], strips, points)
+                self._send(block, rows, [blueprint.SCENE, "closest_points", name], strips, points)
 
     def _capacitive(self, block: FrameBlock) -> None:
         for sensor, name in enumerate(self._layout.capacitive_sensors if block.capacitive is not None else ()):
@@ -213,6 +232,7 @@ class RerunWriter:
             rr.TimeColumn("frame", sequence=[event.frame for event in events]),
         ]
         columns = rr.TextLog.columns(
-            text=[event.text for event in events], level=[_LOG_LEVELS[event.severity] for event in events]
+            text=[f"{event.time / 1e9:.3f} s  {event.text}" for event in events],
+            level=[_LOG_LEVELS[event.severity] for event in events],
         )
         self._stream.send_columns(blueprint.EVENTS, indexes=index, columns=columns, strict=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
 from replay.numerics import transforms
 from replay.recording import blueprint
-from replay.recording.scene_view import BodyView, Floats, SceneView
+from replay.recording.scene_view import BodyView, Color, Floats, SceneView
 from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
 
 CONE = (110, 190, 255, 140)
@@ -23,22 +24,22 @@ def body_path(scene: SceneView, body: BodyView) -> Path:
     return [blueprint.SCENE, scene.links[body.link], body.name.rpartition("/")[2]]
 
 
-def log_scene(stream: Any, scene: SceneView) -> None:
-    """Log everything that does not change."""
+def log_scene(stream: Any, scene: SceneView, colored: Collection[int]) -> None:
+    """Log everything that does not change; the colours of the bodies in `colored` do."""
     import rerun as rr
 
     stream.log(blueprint.SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for body in scene.bodies:
-        _log_mesh(stream, body_path(scene, body), body.triangles, body.color)
+    for k, body in enumerate(scene.bodies):
+        _log_mesh(stream, body_path(scene, body), body.triangles, None if k in colored else body.color)
     for cone in scene.cones:
         lines = rr.LineStrips3D(cone_strips(cone), colors=CONE, radii=rr.Radius.ui_points(0.8))
-        stream.log([blueprint.SCENE, scene.links[cone.link], "distance sensors", cone.sensor], lines, static=True)
-        beam = [blueprint.SCENE, "closest points", cone.sensor]
+        stream.log([blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor], lines, static=True)
+        beam = [blueprint.SCENE, "closest_points", cone.sensor]
         stream.log(beam, _only(rr.LineStrips3D, colors=BEAM, radii=rr.Radius.ui_points(2.0)), static=True)
         stream.log(beam, _only(rr.Points3D, colors=BEAM, radii=rr.Radius.ui_points(5.0)), static=True)
     for plate in scene.plates:
         corners = plate_corners(plate)
-        path = [blueprint.SCENE, scene.links[plate.link], "capacitive sensors", plate.sensor, plate.name]
+        path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
         _log_mesh(stream, path, corners[[[0, 1, 2], [0, 2, 3]]], PLATE)
         outline = rr.LineStrips3D([corners[[0, 1, 2, 3, 0]]], colors=PLATE, radii=rr.Radius.ui_points(1.0))
         stream.log([*path, "outline"], outline, static=True)
@@ -59,7 +60,8 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
         link_poses: (L, 4, 4), T_world_link in one frame.
     """
-    boxes, flat = [], []
+    boxes: list[Floats] = []
+    flat: list[Floats] = []
     for body in scene.bodies:
         points = body.triangles.reshape(-1, 3)
         if not len(points):
@@ -70,16 +72,16 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
     return np.concatenate(boxes or flat or [np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])])
 
 
-def _log_mesh(stream: Any, path: Path, triangles: Floats, color: tuple[int, int, int, int]) -> None:
+def _log_mesh(stream: Any, path: Path, triangles: Floats, color: Color | None) -> None:
     import rerun as rr
 
     mesh = rr.Mesh3D(
         vertex_positions=triangles.reshape(-1, 3),
         triangle_indices=np.arange(3 * len(triangles), dtype=np.uint32).reshape(-1, 3),
         vertex_normals=corner_normals(triangles).reshape(-1, 3),
+        albedo_factor=color,  # what is static cannot change later
     )
     stream.log(path, mesh, static=True)
-    stream.log(path, _only(rr.Mesh3D, albedo_factor=color))  # not static: what is static cannot change later
 
 
 def _only(archetype: Any, **fields: Any) -> Any:

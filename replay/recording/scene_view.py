@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from replay.scenario.scene import Scene
 
 Floats = NDArray[np.float64]
 Color = tuple[int, int, int, int]
@@ -73,7 +77,7 @@ class SceneView:
     """Everything that is drawn.
 
     Attributes:
-        name, description: of the scenario.
+        name, description: of the scenario; the description may be several lines of Markdown.
         texts: the scenario's own text files, by name.
         links: L names.
         bodies, cones, plates: see there.
@@ -93,3 +97,26 @@ def indexed(triangles: Floats) -> tuple[Floats, NDArray[np.uint32]]:
     flat = triangles.reshape(-1, 3) + 0.0  # -0.0 and 0.0 are one vertex
     vertices, index = np.unique(flat, axis=0, return_inverse=True)
     return vertices, index.reshape(-1, 3).astype(np.uint32)
+
+
+def view(scene: Scene) -> SceneView:
+    """Return what a recording shows of a scene."""
+    scenario = scene.scenario
+    notes = "\n".join(f"- {note}" for note in scene.notes)
+    return SceneView(
+        name=scenario.name,
+        description="\n\n".join(part for part in (scenario.description, notes) if part),
+        links=scene.layout.links,
+        bodies=tuple(BodyView(s.name, s.link, s.solid.triangles, s.color) for s in scene.shapes),
+        cones=tuple(ConeView(s.name, s.link, s.T_link_sensor, s.aperture, s.range) for s in scene.distance_sensors),
+        plates=tuple(
+            PlateView(sensor.name, plate.name, sensor.link, plate.T_link_plate, plate.half_size)
+            for sensor in scene.capacitive_sensors
+            for plate in sensor.plates
+        ),
+        texts={
+            name: data.decode(errors="replace")
+            for name, data in scenario.sources.items()
+            if name.endswith((".yaml", ".yml"))
+        },
+    )

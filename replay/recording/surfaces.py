@@ -8,7 +8,8 @@ from replay.numerics import transforms
 from replay.recording.scene_view import ConeView, Floats, PlateView, indexed
 
 _CREASE = 0.8
-"""Cosine of the angle between a face and the mean of its neighbours above which an edge is drawn sharp."""
+"""Cosine of the angle between two faces below which the edge between them is drawn sharp."""
+_MOST_NEIGHBOURS = 64  # faces at one vertex that are looked at; the apex of a fine cone may have more
 _CONE_SEGMENTS = 24
 _ENDLESS_CONE = 2.0
 """Length [m] that a cone without a range is drawn with."""
@@ -17,18 +18,26 @@ _ENDLESS_CONE = 2.0
 def corner_normals(triangles: Floats) -> Floats:
     """Return a unit normal for each corner (t, 3, 3) of triangles: smooth over curved parts, sharp at edges.
 
-    A corner takes the area-weighted mean normal of all faces at its vertex when its own face lies within about 37
-    degrees of that mean, else its face's own normal.
+    A corner takes the area-weighted mean of the normals of those faces at its vertex that lie within about 37 degrees
+    of its own face. Each corner meets the others of its vertex by looking ever further along the corners sorted by
+    vertex.
     """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    vertices, index = indexed(triangles)
-    total = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(total, index[:, corner], across)
-    mean = _unit(total)[index]
-    face = np.repeat(_unit(across)[:, None], 3, axis=1)
-    smooth = np.sum(mean * face, axis=-1) > _CREASE
-    return np.where(smooth[..., None], mean, face)
+    _, index = indexed(triangles)
+    order = np.argsort(index.ravel(), kind="stable")
+    vertex = index.ravel()[order]
+    weighted = np.repeat(across, 3, axis=0)[order]
+    face = _unit(weighted)
+    total = weighted.copy()
+    for step in range(1, min(len(vertex), _MOST_NEIGHBOURS)):
+        near = (vertex[step:] == vertex[:-step]) & (np.sum(face[step:] * face[:-step], axis=1) > _CREASE)
+        if not near.any() and not (vertex[step:] == vertex[:-step]).any():
+            break
+        total[step:][near] += weighted[:-step][near]
+        total[:-step][near] += weighted[step:][near]
+    result = np.empty_like(total)
+    result[order] = _unit(total)
+    return result.reshape(-1, 3, 3)
 
 
 def cone_strips(cone: ConeView) -> list[Floats]:

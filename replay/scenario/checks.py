@@ -18,6 +18,8 @@ from replay.scenario.units import (
     Dimensioned,
 )
 
+WORLD = "world"
+
 Finding = tuple[Path, str]
 """The path of a value, and the rule it breaks."""
 
@@ -35,16 +37,11 @@ def _links(names: Names) -> Iterator[Finding]:
     if not names.parents:
         yield ("links",), "must hold at least one link"
     for link, parent in names.parents.items():
+        if link == WORLD:
+            yield ("links", link), "must have another name: 'world' is the frame that all links stand in"
         if parent is not None and parent not in names.parents:
             yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"
-    in_cycle: set[str] = set()
-    for link in names.parents:
-        chain = [link]
-        while (parent := names.parents.get(chain[-1])) is not None and parent not in chain:
-            chain.append(parent)
-        if parent == link and link not in in_cycle:
-            in_cycle.update(chain)
-            yield ("links", link, "parent"), f"makes a circle: {' -> '.join([*chain, link])}; parents must form trees"
+    yield from _circles(names.parents)
     first: dict[str, JointName] = {}
     for joint in names.joints:
         if joint.type == "fixed":
@@ -53,6 +50,22 @@ def _links(names: Names) -> Iterator[Finding]:
         if other is not joint:
             where = ("links", joint.link, "joint", "name")
             yield where, f"names this joint {joint.name!r} like that of link {other.link!r}; joint names are unique"
+
+
+def _circles(parents: dict[str, str | None]) -> Iterator[Finding]:
+    """Find links that are their own ancestors, each circle once."""
+    settled: set[str] = set()
+    for link in parents:
+        chain: dict[str, None] = {}
+        above: str | None = link
+        while above is not None and above not in settled and above not in chain:
+            chain[above] = None
+            above = parents.get(above)
+        settled.update(chain)
+        if above is not None and above in chain:
+            circle = list(chain)[list(chain).index(above) :]
+            shown = " -> ".join([*circle[:10], *(["..."] if len(circle) > 10 else []), above])
+            yield ("links", above, "parent"), f"makes a circle: {shown}; parents must form trees"
 
 
 def _motion(names: Names) -> Iterator[Finding]:
@@ -157,8 +170,14 @@ def _sensors(names: Names) -> Iterator[Finding]:
 
 def _disabled(names: Names) -> Iterator[Finding]:
     for index, entry in enumerate(names.disable):
-        if entry is not None:
-            yield from _patterns(names, ("collision", "disable", index, "pair"), entry.pair)
+        if entry is None:
+            continue
+        path: Path = ("collision", "disable", index, "pair")
+        found = list(_patterns(names, path, entry.pair))
+        yield from found
+        sides = [names.shapes_matching(pattern) for pattern in entry.pair]
+        if not found and not any(a.link != b.link for a in sides[0] for b in sides[1]):
+            yield path, f"{list(entry.pair)}: these match no two shapes on different links"
 
 
 def _patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import StringConstraints
 
 from replay.scenario.fields import Glob, Part
-from replay.scenario.units import NonNegativeLength
+from replay.scenario.units import Distance
 
 GlobPair = tuple[Glob, Glob]
 
@@ -26,7 +26,7 @@ class Collision(Part):
 
     pairs: Literal["all", "none"] = "all"
     """"all": every pair of shapes on different links that are not joined by a joint; "none": no pair."""
-    margin: NonNegativeLength = 0.05
+    margin: Distance = 0.05
     """Clearances up to this one are computed [m] (model.collision.clearance: near)."""
     disable: tuple[Disable, ...] = ()
     """Pairs that are left out, each with its reason."""

@@ -8,7 +8,7 @@ from pydantic import Discriminator, Tag, model_validator
 
 from replay.scenario.collision import GlobPair
 from replay.scenario.fields import Name, Part, rejected
-from replay.scenario.units import PositiveLength, Time, Voltage
+from replay.scenario.units import Distance, Time, Voltage
 
 When = Literal["never", "always", "sometimes"]
 """In no frame, in every frame, in at least one."""
@@ -40,7 +40,7 @@ Contact = Annotated[
 class ClearanceBounds(Part):
     """Bounds of the clearance."""
 
-    min: PositiveLength
+    min: Distance
     """The clearance never falls below this one [m]."""
 
 
@@ -67,9 +67,9 @@ class DistanceExpectation(Part):
 
     distance: Name
     """Name of the distance sensor."""
-    min: PositiveLength | None = None
+    min: Distance | None = None
     """No reading is below this one [m]."""
-    max: PositiveLength | None = None
+    max: Distance | None = None
     """No reading is above this one [m]."""
     detected: When | None = None
     """Whether something is inside the cone and within range."""

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, StrictBool, StringConstraints, model_validator
 from pydantic_core import PydanticCustomError
 
-from replay.scenario.units import Angle, Length, Number, PositiveLength
+from replay.scenario.units import Angle, Length, Number, Size
 
 
 class Part(BaseModel):
@@ -79,5 +79,5 @@ class Pose(Placement):
     """Where something stands in the frame of what carries it; the default is the same place."""
 
 
-Size2 = tuple[PositiveLength, PositiveLength]
-Size3 = tuple[PositiveLength, PositiveLength, PositiveLength]
+Size2 = tuple[Size, Size]
+Size3 = tuple[Size, Size, Size]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from replay.errors import Problem
+from replay.scenario.node import Node
 from replay.scenario.source import Library, SourceRule, dotted, problem_at, resolve_name
-from replay.scenario.yaml_text import Node, parse
+from replay.scenario.yaml_text import parse
 
 MAX_INCLUDE_DEPTH: Final = 8
 FRAGMENT_KEYS: Final = ("include", "links", "motion", "collision", "sensors", "model", "expect")

@@ -13,9 +13,11 @@ from replay.scenario.include import Text
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.names import Names
+from replay.scenario.node import Node
 from replay.scenario.problems import translate
+from replay.scenario.script import motion_problems
 from replay.scenario.source import Attached, Folder, Library, Provenance, SourceRule, problem_at, resolve_name
-from replay.scenario.yaml_text import Node, parse
+from replay.scenario.yaml_text import parse
 
 VERSION = 1
 
@@ -95,6 +97,9 @@ def _load(library: Library) -> Scenario:
     if problems or scenario is None:
         raise ScenarioError(_in_order(problems))
     scenario._provenance = provenance
+    problems.extend(motion_problems(scenario))
+    if problems:
+        raise ScenarioError(_in_order(problems))
     return scenario
 
 

@@ -88,11 +88,11 @@ class Model(Part):
     """The version of each method."""
 
     collision: CollisionMethod = CollisionMethod()
-    """How collisions are computed."""
+    """Version of the collision methods."""
     distance: DistanceMethod = DistanceMethod()
-    """How distance sensors are computed."""
+    """Version of the distance method."""
     capacitive: CapacitiveMethod = CapacitiveMethod()
-    """How capacitive sensors are computed."""
+    """Version of the capacitive method."""
 
     @property
     def ray_count(self) -> int:

@@ -7,8 +7,11 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from replay.scenario.fields import Flag, Name, Part, Placement, rejected
+from replay.scenario.fields import Flag, Name, Part, Placement, Vector, rejected
 from replay.scenario.units import JointAcceleration, JointPosition, JointVelocity, Share, Time
+
+SHORTEST = 1e-9
+"""Shortest time between two points [s]: the resolution of recordings, and it keeps polynomials finite."""
 
 
 class Waypoint(Part):
@@ -46,14 +49,16 @@ class Move(Part):
 class Keyframe(Placement):
     """Pose of a free link in its joint's frame at one time; between key frames position is linear, rotation slerp."""
 
+    xyz: Vector
+    """Position [m]."""
     time: Time
     """[s] from the scenario's start."""
 
 
 def _increasing(items: tuple[Waypoint | Keyframe, ...]) -> tuple[Waypoint | Keyframe, ...]:
     for index, (earlier, later) in enumerate(itertools.pairwise(items), start=1):
-        if not later.time > earlier.time:
-            raise rejected(f"must be above the one before, {earlier.time:.6g} s", at=(index, "time"))
+        if not later.time - earlier.time >= SHORTEST:
+            raise rejected(f"must be above the one before, {earlier.time:.6g} s, by 1 ns or more", at=(index, "time"))
     return items
 
 

@@ -18,10 +18,10 @@ from replay.scenario.links import Continuous, Joint, Prismatic, Revolute
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoints
+from replay.scenario.node import Node
 from replay.scenario.sensors import CapacitiveSensor, DistanceSensor
 from replay.scenario.source import find
-from replay.scenario.units import NonNegativeLength
-from replay.scenario.yaml_text import Node
+from replay.scenario.units import Distance
 
 SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
 
@@ -155,7 +155,7 @@ class Names:
         """collision.margin [m]."""
         if find(self.root, ("collision", "margin")) is None:
             return 0.05
-        result: float | None = self._entry(NonNegativeLength, "collision", "margin")
+        result: float | None = self._entry(Distance, "collision", "margin")
         return result
 
     @cached_property

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ValidationError
 
 from replay.errors import Problem
 from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
+from replay.scenario.node import Node
 from replay.scenario.shapes import Color
 from replay.scenario.source import dotted, find, locate, problem_at
-from replay.scenario.yaml_text import Node
 
 Path = tuple[str | int, ...]
 
@@ -37,12 +37,18 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
         root: the text's tree.
         model: the model.
     """
-    problems: list[Problem] = []
+    problems: dict[str, Problem] = {}
     for detail in error.errors(include_url=False, include_input=False):
+        if detail["type"] == "too_short" and _long_enough(detail, root, model):
+            continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)
-        if str(problem) not in {str(other) for other in problems}:
-            problems.append(problem)
-    return problems
+        problems.setdefault(str(problem), problem)
+    return list(problems.values())
+
+
+def _long_enough(detail: Any, root: Node, model: type[BaseModel]) -> bool:
+    node = find(root, _follow(detail["loc"], root, model).path)
+    return node is not None and len(node.sequence or node.mapping) >= detail["ctx"]["min_length"]
 
 
 def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:

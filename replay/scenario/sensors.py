@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from replay.scenario.fields import Glob, Name, Part, Pose, Size2, rejected
-from replay.scenario.units import Aperture, Capacitance, NonNegativeLength, Permittivity, Range, Supply
+from replay.scenario.units import Aperture, Capacitance, Distance, Permittivity, Range, Supply
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
@@ -25,7 +25,7 @@ class DistanceSensor(Part):
     """Full opening angle of the cone [rad], at most a full turn."""
     range: Range = math.inf
     """Largest distance that is read [m]."""
-    min_range: NonNegativeLength = 0.0
+    min_range: Distance = 0.0
     """Distances below this one are read as "too close" [m]."""
     ignore: tuple[Glob, ...] = ()
     """Patterns of the names of links that are not sensed; the sensor's own link never is."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from replay.scenario.fields import Flag, Part, Pose, Size2, Size3, rejected
-from replay.scenario.units import Aperture, PositiveLength, PositiveNumber
+from replay.scenario.units import Aperture, Scale, Size
 
 FINEST_CHORD = 1e-5
 """Smallest chord error as a fraction of the radius: a sphere then has about 0.6 million triangles."""
@@ -32,7 +32,7 @@ class Cube(ShapePart):
     """A cube centred at its origin."""
 
     type: Literal["cube"]
-    size: PositiveLength
+    size: Size
     """Edge length [m]."""
 
 
@@ -55,18 +55,17 @@ class Plane(ShapePart):
 class Curved(ShapePart):
     """What all tessellated shapes have in common."""
 
-    radius: PositiveLength
+    radius: Size
     """Radius [m]."""
-    chord_error: PositiveLength = 0.001
+    chord_error: Size = 0.001
     """Largest distance between the true surface and its triangles [m]."""
 
     @model_validator(mode="after")
     def _sensible_chord_error(self) -> Self:
-        if not FINEST_CHORD * self.radius <= self.chord_error < self.radius:
-            low, high = FINEST_CHORD * self.radius, self.radius
+        finest = FINEST_CHORD * self.radius
+        if self.chord_error < finest:
             given = "" if "chord_error" in self.model_fields_set else f"({self.chord_error:.6g} m when left out) "
-            rule = f"{given}must be at least {low:.6g} m and below the radius {high:.6g} m"
-            raise rejected(rule, at=("chord_error",))
+            raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
         return self
 
 
@@ -80,7 +79,7 @@ class Cylinder(Curved):
     """A cylinder along z, its origin at half height."""
 
     type: Literal["cylinder"]
-    height: PositiveLength
+    height: Size
     """Height [m]."""
 
 
@@ -88,7 +87,7 @@ class Cone(Curved):
     """A cone along z with its apex at +z, its origin at half height."""
 
     type: Literal["cone"]
-    height: PositiveLength
+    height: Size
     """Height [m]."""
 
 
@@ -98,9 +97,9 @@ class Arc(Curved):
     type: Literal["arc"]
     span: Aperture
     """Angle that the arc covers [rad], at most a full turn."""
-    width: PositiveLength
+    width: Size
     """Width along z [m]."""
-    thickness: PositiveLength
+    thickness: Size
     """Radial thickness [m]; the radius is that of the mid-line."""
 
     @model_validator(mode="after")
@@ -116,7 +115,7 @@ class Mesh(ShapePart):
     type: Literal["mesh"]
     file: Annotated[str, StringConstraints(min_length=1, max_length=1000)]
     """Path relative to the file that names it, inside the scenario's folder tree, or package://PYTHON_PACKAGE/path."""
-    scale: PositiveNumber
+    scale: Scale
     """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres."""
 
 

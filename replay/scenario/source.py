@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from replay.errors import Problem
-from replay.scenario.yaml_text import Node, Place
+from replay.scenario.node import Node, Place
 
 PACKAGE: Final = "package://"
 MAX_FILE_BYTES: Final = 1 << 30
@@ -41,7 +41,7 @@ class Library(Protocol):
         """Return the file's bytes; raises SourceRule."""
 
 
-@dataclass(eq=False)
+@dataclass
 class Provenance:
     """Where a scenario was read from.
 
@@ -55,7 +55,7 @@ class Provenance:
     main: str = ""
     sources: dict[str, bytes] = field(default_factory=dict)
     meshes: dict[tuple[str, str], str] = field(default_factory=dict)
-    root: Node | None = None
+    root: Node | None = field(default=None, compare=False)
 
     @cached_property
     def sha256(self) -> dict[str, str]:

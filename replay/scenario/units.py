@@ -20,7 +20,7 @@ _PI = Fraction(31415926535897932384626433832795028841971693993751058209749446, 1
 _DEGREE = _PI / 180
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Dimension:
     """A physical dimension with the units it may be written in.
 
@@ -33,7 +33,7 @@ class Dimension:
 
     name: str
     si: str
-    units: dict[str, Fraction] = field(repr=False)
+    units: dict[str, Fraction] = field(repr=False, compare=False)
     example: str = field(repr=False)
 
     @property
@@ -222,6 +222,8 @@ class AnyQuantity:
         number = _double(exact)
         if math.isinf(number):
             raise _rejected("is not finite")
+        if abs(number) > _FAR:
+            raise _rejected(f"must be between -{_FAR:g} and {_FAR:g}")
         return Dimensioned(number, dimension)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -248,28 +250,34 @@ def json_schema(name: str, number: dict[str, Any], dimensions: tuple[Dimension, 
 
 FULL_TURN: Final = 2.0 * math.pi
 
-Number = Annotated[float, Quantity("Number", NUMBER)]
-Length = Annotated[float, Quantity("Length", LENGTH)]
-PositiveLength = Annotated[float, Quantity("PositiveLength", LENGTH, above=0.0)]
-NonNegativeLength = Annotated[float, Quantity("NonNegativeLength", LENGTH, at_least=0.0)]
+_FAR = 1e12
+"""Largest length [m] and joint position: its sixth power stays finite, and its rounding below 1 mm."""
+
+_SMALL = 1e-9
+"""Smallest size [m] and smallest joint limit: smaller ones are slips of a unit, and their areas drown in rounding."""
+
+Number = Annotated[float, Quantity("Number", NUMBER, at_least=-1e100, at_most=1e100)]
+Length = Annotated[float, Quantity("Length", LENGTH, at_least=-_FAR, at_most=_FAR)]
+Size = Annotated[float, Quantity("Size", LENGTH, at_least=_SMALL, at_most=_FAR)]
+Distance = Annotated[float, Quantity("Distance", LENGTH, at_least=0.0, at_most=_FAR)]
 Range = Annotated[float, Quantity("Range", LENGTH, above=0.0, infinite=True)]
-Angle = Annotated[float, Quantity("Angle", ANGLE)]
+Angle = Annotated[float, Quantity("Angle", ANGLE, at_least=-_FAR, at_most=_FAR)]
 Aperture = Annotated[float, Quantity("Aperture", ANGLE, above=0.0, at_most=FULL_TURN)]
-Time = Annotated[float, Quantity("Time", TIME, at_least=0.0)]
+Time = Annotated[float, Quantity("Time", TIME, at_least=0.0, at_most=1e9)]
 Duration = Annotated[Fraction, Quantity("Duration", TIME, at_least=0.0, at_most=1e9, exact=True)]
 Rate = Annotated[Fraction, Quantity("Rate", FREQUENCY, above=0.0, at_most=1e9, exact=True)]
-MaxVelocity = Annotated[float, Quantity("MaxVelocity", VELOCITY, above=0.0, infinite=True)]
-MaxAngularVelocity = Annotated[float, Quantity("MaxAngularVelocity", ANGULAR_VELOCITY, above=0.0, infinite=True)]
-MaxAcceleration = Annotated[float, Quantity("MaxAcceleration", ACCELERATION, above=0.0, infinite=True)]
+MaxVelocity = Annotated[float, Quantity("MaxVelocity", VELOCITY, at_least=_SMALL, infinite=True)]
+MaxAngularVelocity = Annotated[float, Quantity("MaxAngularVelocity", ANGULAR_VELOCITY, at_least=_SMALL, infinite=True)]
+MaxAcceleration = Annotated[float, Quantity("MaxAcceleration", ACCELERATION, at_least=_SMALL, infinite=True)]
 MaxAngularAcceleration = Annotated[
-    float, Quantity("MaxAngularAcceleration", ANGULAR_ACCELERATION, above=0.0, infinite=True)
+    float, Quantity("MaxAngularAcceleration", ANGULAR_ACCELERATION, at_least=_SMALL, infinite=True)
 ]
-Capacitance = Annotated[float, Quantity("Capacitance", CAPACITANCE, above=0.0)]
-Permittivity = Annotated[float, Quantity("Permittivity", PERMITTIVITY, above=0.0)]
-Voltage = Annotated[float, Quantity("Voltage", VOLTAGE)]
-Supply = Annotated[float, Quantity("Supply", VOLTAGE, above=0.0)]
-Share = Annotated[float, Quantity("Share", NUMBER, above=0.0, at_most=1.0)]
-PositiveNumber = Annotated[float, Quantity("PositiveNumber", NUMBER, above=0.0)]
+Capacitance = Annotated[float, Quantity("Capacitance", CAPACITANCE, at_least=1e-18, at_most=1.0)]
+Permittivity = Annotated[float, Quantity("Permittivity", PERMITTIVITY, at_least=1e-18, at_most=1.0)]
+Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1e6)]
+Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]
+Share = Annotated[float, Quantity("Share", NUMBER, at_least=1e-3, at_most=1.0)]
+Scale = Annotated[float, Quantity("Scale", NUMBER, at_least=1e-9, at_most=1e9)]
 
 JointPosition = Annotated[Dimensioned, AnyQuantity("JointPosition", (ANGLE, LENGTH))]
 JointVelocity = Annotated[Dimensioned, AnyQuantity("JointVelocity", (ANGULAR_VELOCITY, VELOCITY))]
