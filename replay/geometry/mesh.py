@@ -6,7 +6,7 @@ import io
 import math
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from replay.errors import InvalidValue, MeshError
 from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
+from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
 from replay.numerics.jit import kernel
 
 Array = NDArray[np.float64]
@@ -87,25 +88,28 @@ def solid_from_triangles(triangles: Array) -> Solid:
     if dropped:
         notes.append(f"{dropped} of {len(triangles)} triangles have no area and were dropped")
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
-    topology = _topology(triangles)
+    faces = corner_indices(triangles)
+    joints = topology(faces)
+    if joints.open_edges == 0 and joints.reversed_edges:
+        turned = wound_against_neighbours(faces)
+        faces[turned] = faces[turned][:, [0, 2, 1]]
+        if topology(faces).is_closed:
+            joints = topology(faces)
+            triangles[turned] = triangles[turned][:, [0, 2, 1]]
+            notes.append(f"{np.count_nonzero(turned)} triangles were wound against their neighbours and turned over")
     triangles = np.ascontiguousarray(triangles[~flat])
-    if topology.open_edges:
-        notes.append(f"not watertight: {topology.open_edges} edges are open; it has no inside, only a surface")
-    elif topology.reversed_edges:
+    if joints.open_edges:
+        notes.append(f"not watertight: {joints.open_edges} edges are open; it has no inside, only a surface")
+    elif joints.reversed_edges:
         notes.append(
-            f"not watertight: neighbouring triangles are wound against each other along {topology.reversed_edges} edges"
+            f"not watertight: neighbouring triangles are wound against each other along {joints.reversed_edges} edges"
         )
-    watertight = topology.open_edges == 0 and topology.reversed_edges == 0
+    watertight = joints.is_closed
     if watertight and signed_volume(triangles) < 0.0:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         notes.append("inside out (its volume is negative): the triangles were turned over")
     pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
     return Solid(triangles, pieces=pieces, watertight=watertight, dropped=dropped, notes=tuple(notes))
-
-
-class _Topology(NamedTuple):
-    open_edges: int  # edges with an odd number of triangles
-    reversed_edges: int  # others that are not walked equally often both ways
 
 
 def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
@@ -141,21 +145,6 @@ def _have_area(triangles: Array) -> NDArray[np.bool_]:
     safe = np.where(longest > 0.0, longest, 1.0)[:, None]
     cross = np.cross(edges[0] / safe, edges[2] / safe)
     return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * np.finfo(np.float64).eps))
-
-
-def _topology(triangles: Array) -> _Topology:
-    """Count what keeps the surface from being closed and wound one way; corners are one where they are equal."""
-    _, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    face = corner.reshape(-1, 3).astype(np.int64)
-    start, end = face.ravel(), face[:, [1, 2, 0]].ravel()
-    keep = start != end
-    start, end = start[keep], end[keep]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    _, edge = np.unique(low * (face.max() + 1) + high, return_inverse=True)
-    total = np.bincount(edge)
-    balance = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
-    odd = total % 2 == 1
-    return _Topology(int(np.count_nonzero(odd)), int(np.count_nonzero(~odd & (balance != 0.0))))
 
 
 def _convex_corners(triangles: Array) -> Array:

@@ -11,7 +11,7 @@ from replay.recording.behind import WriteBehind, Writer
 from replay.recording.provenance import describe
 from replay.recording.scene_view import view
 from replay.recording.writer import McapWriter
-from replay.simulation import FrameBlock
+from replay.simulation import FrameBlock, Simulation
 
 if TYPE_CHECKING:
     from replay.scenario.methods import Model
@@ -55,11 +55,9 @@ def record(
         ReplayError: whatever the simulation raises; no file is left then.
     """
     from replay.scenario.scene import build
-    from replay.simulation import simulate
 
     scene = build(scenario, model=model)
-    blocks = simulate(scenario, model=model)
-    return record_blocks(scene, blocks, directory, rrd=rrd, overwrite=overwrite, progress=progress)
+    return record_blocks(scene, Simulation(scene).blocks(), directory, rrd=rrd, overwrite=overwrite, progress=progress)
 
 
 def record_blocks(

@@ -73,10 +73,10 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
         return problem_at(root, (*path, *context.get("at", ())), context["rule"])
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag(kind, context, path, root)
-    return problem_at(root, path, _rule(kind, context, find(root, path)))
+    return problem_at(root, path, _rule(kind, context, detail["msg"], find(root, path)))
 
 
-def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
+def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -> str:
     match kind:
         case "string_type":
             scalar = node is not None and not isinstance(node.value, dict | list | None)
@@ -107,7 +107,7 @@ def _rule(kind: str, context: dict[str, Any], node: Node | None) -> str:
         case "less_than_equal":
             return f"must be at most {context['le']}"
         case _:
-            raise AssertionError(f"an error of the kind {kind!r} has no words yet")
+            return f"is not valid: {message}"
 
 
 def _pattern_of(annotation: Any) -> str:

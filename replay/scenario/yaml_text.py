@@ -14,6 +14,8 @@ from typing import Any, Final
 from replay.errors import Problem
 from replay.scenario.node import Node, Place, Scalar
 
+__all__ = ["MAX_BYTES", "MAX_DEPTH", "MAX_DIGITS", "MAX_NODES", "Node", "parse"]
+
 MAX_BYTES: Final = 4 << 20
 """Scenario text is written by people; 4 MiB is read in about 20 s, and more is a mistake."""
 

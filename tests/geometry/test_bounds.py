@@ -251,8 +251,9 @@ def test_obb_of_anything(count: int, seed: int, flatness: list[float], exponent:
 def test_extreme_magnitudes(far: float) -> None:
     points = primitives.cube(1.0).vertices * far
     assert np.isfinite(fit_sphere(points).radius) and np.isfinite(fit_aabb(points).half_widths).all()
-    box = fit_obb(points)
-    np.testing.assert_allclose(box.half_widths, 0.5 * far, rtol=1e-13)
+    for triangles in (None, primitives.cube(1.0).triangles * far, primitives.cube(1.0).triangles):
+        box = fit_obb(points, triangles=triangles)
+        np.testing.assert_allclose(box.half_widths, 0.5 * far, rtol=1e-13)
 
 
 @pytest.mark.parametrize(
