@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.collision.leaf import leaf
 from replay.kinematics.linkage import Linkage
 from replay.numerics.jit import kernel
 
@@ -72,7 +73,7 @@ def _relative(local: Floats, ways: Integers, pairs: Integers) -> Floats:
     return result
 
 
-@kernel
+@leaf
 def _compose(first: Floats, second: Floats, product: Floats) -> None:
     """Write first second, rigid transforms (4, 4), in the order of operations of `transforms.compose`."""
     for i in range(3):
