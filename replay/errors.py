@@ -104,5 +104,13 @@ class WriteError(ReplayError):
         super().__init__(f"{file}: cannot be written: {reason}")
 
 
+class WorkerError(ReplayError):
+    """Worker processes cannot be used: they die before they have begun."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"worker processes cannot be started: {reason}")
+
+
 class ViewerError(ReplayError):
     """The rerun viewer could not show or render a recording."""
