@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.scenario.load import load, load_sources
 from replay.scenario.model import Scenario
@@ -71,7 +73,34 @@ def select(scenarios: Sequence[Scenario], patterns: Sequence[str]) -> list[Scena
     return [scenario for scenario in scenarios if any(_matches(scenario, pattern) for pattern in patterns)]
 
 
+@dataclass(frozen=True)
+class Selection:
+    """What a command is about.
+
+    Attributes:
+        chosen: the scenarios to run.
+        skipped: those that were filtered out, by name, with the reason.
+    """
+
+    chosen: tuple[Scenario, ...]
+    skipped: Mapping[str, str]
+
+    @staticmethod
+    def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
+        """Return what paths, patterns and a shard select; errors as of `load_all`."""
+        everything = load_all(paths)
+        matching = select(everything, patterns)
+        chosen = shard.of(matching) if shard else matching
+        names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
+        skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
+        skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
+        return Selection(tuple(chosen), skipped)
+
+
 def _matches(scenario: Scenario, pattern: str) -> bool:
+    """Return whether a pattern selects a scenario; a name itself does even when it holds brackets."""
+    if scenario.name == pattern:
+        return True
     if pattern.startswith("tag:"):
         return any(fnmatch.fnmatchcase(tag, pattern.removeprefix("tag:")) for tag in scenario.tags)
     return fnmatch.fnmatchcase(scenario.name, pattern)
