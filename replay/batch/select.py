@@ -10,7 +10,7 @@ from pathlib import Path
 
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
-from replay.scenario.load import load, load_sources
+from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
 
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
@@ -41,7 +41,7 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
-    """Return the scenarios of all paths; a recording (`.mcap`) gives the scenario that is attached to it.
+    """Return the scenarios of all paths: of a file with a sweep its cases, of a recording (`.mcap`) its own scenario.
 
     Raises:
         ScenarioError: what is wrong with any of them, all problems together; or two have the same name.
@@ -53,14 +53,15 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
         try:
-            scenario = _attached(path) if path.suffix == ".mcap" else load(path)
+            found = [_attached(path)] if path.suffix == ".mcap" else load_cases(path)
         except ScenarioError as error:
             problems.extend(error.problems)
             continue
-        if scenario.name in homes:
-            problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
-        homes[scenario.name] = path
-        scenarios.append(scenario)
+        for scenario in found:
+            if scenario.name in homes:
+                problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
+            homes[scenario.name] = path
+            scenarios.append(scenario)
     if problems:
         raise ScenarioError(problems)
     return scenarios
@@ -113,4 +114,4 @@ def _attached(path: Path) -> Scenario:
     with McapLog(path) as log:
         provenance = read_provenance(log)
         sources = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
-    return load_sources(provenance.root, sources)
+    return load_sources(provenance.root, sources, case=provenance.scenario)

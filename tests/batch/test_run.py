@@ -82,7 +82,8 @@ def test_kernels_are_all_compiled_before_the_first_scenario(tmp_path):
     simulate = "[block for block in replay.simulate(scene('a'))]"
     counts = []
     for code in (prepare, f"{prepare}; {simulate}"):
-        head = "import replay; from replay.batch.prepare import PrepareKernels, needs_of; from tests.batch.scenes import scene"
+        head = "import replay; from replay.batch.prepare import PrepareKernels, needs_of"
+        head += "; from tests.batch.scenes import scene"
         subprocess.run([sys.executable, "-c", f"{head}; {code}"], check=True, env=environment, capture_output=True)
         counts.append(len(list(tmp_path.rglob("*.nb[ic]"))))
     assert counts[0] == counts[1] > 20
