@@ -108,10 +108,7 @@ def _matches(scenario: Scenario, pattern: str) -> bool:
 
 
 def _attached(path: Path) -> Scenario:
-    from replay.logs.mcap_reader import McapLog
-    from replay.recording.reader import read_provenance
+    from replay.recording.slim import attached_files
 
-    with McapLog(path) as log:
-        provenance = read_provenance(log)
-        sources = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
-    return load_sources(provenance.root, sources, case=provenance.scenario)
+    name, root, files = attached_files(path)
+    return load_sources(root, files, case=name)
