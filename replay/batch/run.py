@@ -14,7 +14,7 @@ import platform
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import psutil
 
@@ -181,16 +181,18 @@ def run_all(
 def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: Watch) -> Generator[Ended]:
     orders = [task.payload for task in tasks]
     needs = {need: None for order in orders for need in needs_of([order.scenario], order.model)}
-    pool = Pool(
-        run_case,
-        workers=workers,
-        timeout=execution.timeout,
-        memory=execution.memory,
-        prepare=PrepareKernels(tuple(needs)),
-        follow=watch.follow,
-        tell=watch.tell,
-    )
-    yield from pool.run(tasks)
+    limits: dict[str, Any] = {
+        "timeout": execution.timeout,
+        "memory": execution.memory,
+        "prepare": PrepareKernels(tuple(needs)),
+        "follow": watch.follow,
+    }
+    if execution.dask is not None:
+        from replay.batch.cluster import Cluster
+
+        yield from Cluster(execution.dask, run_case, **limits).run(tasks)
+    else:
+        yield from Pool(run_case, workers=workers, tell=watch.tell, **limits).run(tasks)
 
 
 def _reused(

@@ -13,6 +13,9 @@ from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
 
+RULES = "rules.yaml"
+"""Name of the file of tolerances that comes with a folder of scenarios."""
+
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
 
 
@@ -38,6 +41,13 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
         else:
             raise InvalidValue("SCENARIO", path, "is not there; give a scenario file, a recording, or a folder")
     return list(found)
+
+
+def rules_beside(paths: Sequence[str | Path]) -> Path | None:
+    """Return the tolerances that come with scenarios: `rules.yaml` in the first folder named, or beside the file."""
+    first = Path(paths[0])
+    file = (first if first.is_dir() else first.parent) / RULES
+    return file if file.is_file() else None
 
 
 def load_all(paths: Sequence[str | Path]) -> list[Scenario]:

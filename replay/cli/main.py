@@ -19,6 +19,8 @@ COMMANDS = {
     "info": "say what is in a recording",
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
+    "regress": "run scenarios and compare each with its baseline",
+    "accept": "make a run's recordings the baseline",
     "view": "show recordings in the rerun viewer, or make a picture",
 }
 """Help by name of command; each is the function of that name in the module of that name."""

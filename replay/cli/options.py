@@ -53,6 +53,15 @@ def execution_options(command: Command) -> Command:
     return command
 
 
+def settings(options: dict[str, Any]) -> dict[str, Any]:
+    """Return `model` and `execution` of a run as the options name them."""
+    from replay.batch.run import Execution
+    from replay.scenario.load import load_model
+
+    execution = Execution(**{name: options[name] for name in ("workers", "timeout", "memory", "dask")})
+    return {"model": load_model(options["model"]) if options["model"] else None, "execution": execution}
+
+
 def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:
     """Write a result to stdout as text for people or as JSON for programs."""
     click.echo(text() if form == "text" else json.dumps(data(), indent=1))

@@ -9,6 +9,7 @@ from replay.cli.options import say
 
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
+    from replay.batch.regress import Regression
     from replay.batch.run import Run
 
 
@@ -28,3 +29,15 @@ def exit_code(run: Run) -> ExitCode:
     """Return what the shell is told of a run."""
     interrupted = ExitCode.INTERRUPTED if run.interrupted else ExitCode.FINE
     return worst([interrupted, ExitCode.FINE if run.passed else ExitCode.FAILED])
+
+
+def regression_code(found: Regression) -> ExitCode:
+    """Return what the shell is told of a regression."""
+    return worst([exit_code_of(item.verdict.name) for item in found.judged])
+
+
+def exit_code_of(verdict: str) -> ExitCode:
+    """Return the exit code of one scenario's verdict."""
+    codes = {"DIFFERENT": ExitCode.DIFFERENT, "INTERRUPTED": ExitCode.INTERRUPTED, "UNREADABLE": ExitCode.INVALID}
+    fine = ("SAME", "CREATED", "UNCOMPARED", "SKIPPED")
+    return ExitCode.FINE if verdict in fine else codes.get(verdict, ExitCode.FAILED)

@@ -28,33 +28,31 @@ if TYPE_CHECKING:
 def run(
     scenarios: tuple[Path, ...],
     output: Path,
-    model: str | None,
     patterns: tuple[str, ...],
     shard: Shard | None,
     no_rrd: bool,
     overwrite: bool,
     resume: bool,
     form: str,
-    **execution: Any,
+    **how: Any,
 ) -> ExitCode:
     """Simulate SCENARIOS (files, folders, or recordings to run again) and record them.
 
     Each goes to OUTPUT/NAME/NAME.mcap and .rrd. Exit code 4: an expectation does not hold, or a scenario failed.
     """
-    from replay.batch.run import Execution, run_all
+    from replay.batch.run import run_all
     from replay.batch.select import Selection
     from replay.cli.progress import RunProgress
     from replay.cli.results import exit_code, show
-    from replay.scenario.load import load_model
 
     if overwrite and resume:
         raise click.UsageError("--overwrite and --resume exclude each other")
-    version = load_model(model) if model else None
+    settings = options.settings(how)
     chosen = Selection.of(scenarios, patterns, shard).chosen
     if not chosen:
         return options.nothing(patterns)
     with RunProgress() as watch:
-        flags = {"rrd": not no_rrd, "overwrite": overwrite, "resume": resume}
-        done = run_all(chosen, output, model=version, execution=Execution(**execution), watch=watch, **flags)
+        flags: dict[str, Any] = {"rrd": not no_rrd, "overwrite": overwrite, "resume": resume}
+        done = run_all(chosen, output, watch=watch, **flags, **settings)
     show(form, done)
     return exit_code(done)
