@@ -69,7 +69,7 @@ class Cluster:
         except ImportError:
             raise MissingPackageError("distributed", "--dask", "pip install 'replay[dask]'") from None
         try:
-            client = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)
+            client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise WorkerError(f"the Dask scheduler {self._address} does not answer ({error})") from None
         with contextlib.closing(client), client.get_executor(pure=False) as executor:
