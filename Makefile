@@ -46,6 +46,7 @@ type: $(VENV)/.test  ## check types
 
 schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
+	$(BIN)/python -m replay.comparison.rules_file
 	cd replay/recording/schemas && ../../../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=replay.binpb *.proto
 
 pictures: setup system  ## render the README's pictures from the recordings that `make run` left

@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from replay.comparison.runs import diff as diff
     from replay.recording.reader import read as read
     from replay.recording.record import record as record
     from replay.scenario.load import load as load
@@ -25,8 +26,21 @@ _PUBLIC = {
     "record": "replay.recording.record",
     "read": "replay.recording.reader",
     "Recording": "replay.recording.reader",
+    "diff": "replay.comparison.runs",
+    "Difference": "replay.comparison.difference",
 }
-_ROOMS = ("errors", "numerics", "geometry", "kinematics", "collision", "sensing", "scenario", "recording", "simulation")
+_ROOMS = (
+    "errors",
+    "numerics",
+    "geometry",
+    "kinematics",
+    "collision",
+    "sensing",
+    "scenario",
+    "recording",
+    "simulation",
+    "comparison",
+)
 
 __all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
 
