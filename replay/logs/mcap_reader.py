@@ -19,6 +19,7 @@ from replay.errors import RecordingError
 from replay.logs.mcap_chunks import Run, read_message, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
+    MAX_RECORD,
     MESSAGE_HEAD,
     PREAMBLE,
     RECORD_HEAD,
@@ -33,9 +34,6 @@ from replay.logs.mcap_records import (
     read_chunk,
     read_schema,
 )
-
-MAX_RECORD = 1 << 30
-"""Largest record [bytes] that is read; a larger length is damage or an attack."""
 
 
 @dataclass(frozen=True)
