@@ -121,8 +121,11 @@ def fit_obb(
     covariance = np.zeros((3, 3))
     area = 0.0
     if method == "triangles" and (surface is not None or hull is not None):
-        faces = (surface - origin) / scale if surface is not None else local[hull.faces]  # type: ignore[union-attr]
-        area, covariance = covariance_of_triangles(np.ascontiguousarray(faces))
+        if surface is not None:  # in its own unit box: the axes do not depend on the scale
+            faces = to_unit_box(surface.reshape(-1, 3))[0].reshape(-1, 3, 3)
+        else:
+            faces = np.ascontiguousarray(local[hull.faces])  # type: ignore[union-attr]
+        area, covariance = covariance_of_triangles(faces)
     if not area > 0.0:
         covariance = covariance_of_points(local)
     return _tight(points, local, origin, scale, box_axes(local, hull, covariance))

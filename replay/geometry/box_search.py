@@ -41,7 +41,7 @@ def box_volume(points: Array, axes: Array) -> float:
     """Return the volume of the box along axes (3, 3 rows) around points (n, 3)."""
     volume = 1.0
     for i in range(3):
-        x, y, z = axes[i]
+        x, y, z = axes[i, 0], axes[i, 1], axes[i, 2]
         low, high = np.inf, -np.inf
         for k in range(len(points)):
             value = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
@@ -64,50 +64,63 @@ def smallest_box(points: Array, axes: Array, trials: Array, starts: Array, kept:
     """
     total = 1 + kept + len(starts)
     boxes, volumes = np.empty((total, 3, 3)), np.full(total, np.inf)
-    boxes[0] = axes
-    volumes[0] = box_volume(points, axes)
-    trial = np.empty((3, 3))
+    result, trial, scratch = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    _copy(axes, result)
+    _copy(axes, boxes[0])
+    best = box_volume(points, axes)
+    volumes[0] = best
     for k in range(len(trials)):
         volume = turn_about(points, trials[k], trial)
-        worst = 1 + np.argmax(volumes[1 : 1 + kept])
+        worst = 1
+        for j in range(2, kept + 1):
+            if volumes[j] > volumes[worst]:
+                worst = j
         if volume < volumes[worst]:
             volumes[worst] = volume
-            boxes[worst] = trial
+            _copy(trial, boxes[worst])
     for k in range(len(starts)):
-        boxes[1 + kept + k] = starts[k]
+        _copy(starts[k], boxes[1 + kept + k])
         volumes[1 + kept + k] = box_volume(points, starts[k])
-    result = axes.copy()
-    best = volumes[0]
     for k in range(total):
         if volumes[k] < best * (1.0 - _GAIN):
             best = volumes[k]
-            result[:] = boxes[k]
+            _copy(boxes[k], result)
     if best <= floor * (1.0 + 1e-6):
         return result
     for k in range(total):
         if volumes[k] < np.inf:
-            volumes[k] = _turn(points, boxes[k], volumes[k])
+            volumes[k] = _turn(points, boxes[k], volumes[k], trial)
     for _ in range(_NUDGED):
-        k = int(np.argmin(volumes))
-        if volumes[k] < np.inf:
-            volume = _turn(points, boxes[k], _nudge(points, boxes[k], volumes[k]))
+        least = 0
+        for k in range(total):
+            if volumes[k] < volumes[least]:
+                least = k
+        if volumes[least] < np.inf:
+            volume = _nudge(points, boxes[least], volumes[least], trial, scratch)
+            volume = _turn(points, boxes[least], volume, trial)
             if volume < best * (1.0 - _GAIN):
                 best = volume
-                result[:] = boxes[k]
-            volumes[k] = np.inf
+                _copy(boxes[least], result)
+            volumes[least] = np.inf
     return result
 
 
 @kernel
-def _turn(points: Array, axes: Array, volume: float) -> float:
+def _copy(source: Array, target: Array) -> None:
+    for i in range(3):
+        for j in range(3):
+            target[i, j] = source[i, j]
+
+
+@kernel
+def _turn(points: Array, axes: Array, volume: float, trial: Array) -> float:
     """Turn a box about its own axes in turn, in place, until none of the three makes it smaller; return its volume."""
-    trial = np.empty((3, 3))
     failed, i = 0, 0
     for _ in range(_MOST_TURNS):
-        turned = turn_about(points, axes[i].copy(), trial)
+        turned = turn_about(points, axes[i], trial)
         if turned < volume * (1.0 - _GAIN):
             volume, failed = turned, 0
-            axes[:] = trial
+            _copy(trial, axes)
             i = 1  # the axis just used is now the first
         else:
             failed += 1
@@ -118,9 +131,8 @@ def _turn(points: Array, axes: Array, volume: float) -> float:
 
 
 @kernel
-def _nudge(points: Array, axes: Array, volume: float) -> float:
+def _nudge(points: Array, axes: Array, volume: float, trial: Array, best: Array) -> float:
     """Turn a box, in place, by small angles about the 26 directions, the best first; return its volume."""
-    trial, best = np.empty((3, 3)), np.empty((3, 3))
     angle = _FIRST_NUDGE
     for _ in range(_MOST_NUDGES):
         c, s = math.cos(angle), math.sin(angle)
@@ -132,7 +144,7 @@ def _nudge(points: Array, axes: Array, volume: float) -> float:
             y = u[0] * axes[0, 1] + u[1] * axes[1, 1] + u[2] * axes[2, 1]
             z = u[0] * axes[0, 2] + u[1] * axes[1, 2] + u[2] * axes[2, 2]
             for i in range(3):  # Rodrigues: c a + s u x a + (1 - c) (u . a) u, and u . a_i = u_i of the box
-                ax, ay, az = axes[i]
+                ax, ay, az = axes[i, 0], axes[i, 1], axes[i, 2]
                 w = (1.0 - c) * u[i]
                 trial[i, 0] = c * ax + s * (y * az - z * ay) + w * x
                 trial[i, 1] = c * ay + s * (z * ax - x * az) + w * y
@@ -140,10 +152,10 @@ def _nudge(points: Array, axes: Array, volume: float) -> float:
             turned = box_volume(points, trial)
             if turned < least:
                 least, found = turned, True
-                best[:] = trial
+                _copy(trial, best)
         if found:
             volume = least
-            axes[:] = best
+            _copy(best, axes)
             angle = min(1.5 * angle, _FIRST_NUDGE)
         else:
             angle *= 0.5

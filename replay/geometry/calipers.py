@@ -34,23 +34,24 @@ def turn_about(points: Array, axis: Array, axes: Array) -> float:
     for i in range(1, 3):
         if abs(axis[i]) < abs(axis[least]):
             least = i
-    e = np.zeros(3)
-    e[least] = 1.0
-    e -= axis[least] * axis
-    e /= math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    fx, fy, fz = axis[1] * e[2] - axis[2] * e[1], axis[2] * e[0] - axis[0] * e[2], axis[0] * e[1] - axis[1] * e[0]
+    ax, ay, az = axis[0], axis[1], axis[2]
+    ex, ey, ez = -axis[least] * ax, -axis[least] * ay, -axis[least] * az
+    ex, ey, ez = ex + (least == 0), ey + (least == 1), ez + (least == 2)
+    length = math.sqrt(ex * ex + ey * ey + ez * ez)
+    ex, ey, ez = ex / length, ey / length, ez / length
+    fx, fy, fz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
     x, y = np.empty(n), np.empty(n)
     low, high = np.inf, -np.inf
     for k in range(n):
-        px, py, pz = points[k]
-        x[k], y[k] = e[0] * px + e[1] * py + e[2] * pz, fx * px + fy * py + fz * pz
-        height = axis[0] * px + axis[1] * py + axis[2] * pz
+        px, py, pz = points[k, 0], points[k, 1], points[k, 2]
+        x[k], y[k] = ex * px + ey * py + ez * pz, fx * px + fy * py + fz * pz
+        height = ax * px + ay * py + az * pz
         low, high = min(low, height), max(high, height)
     hx, hy = _hull_of_projection(x, y)
     area, c, s = _smallest_rectangle(hx, hy)
-    axes[0] = axis
-    axes[1, 0], axes[1, 1], axes[1, 2] = c * e[0] + s * fx, c * e[1] + s * fy, c * e[2] + s * fz
-    axes[2, 0], axes[2, 1], axes[2, 2] = c * fx - s * e[0], c * fy - s * e[1], c * fz - s * e[2]
+    axes[0, 0], axes[0, 1], axes[0, 2] = ax, ay, az
+    axes[1, 0], axes[1, 1], axes[1, 2] = c * ex + s * fx, c * ey + s * fy, c * ez + s * fz
+    axes[2, 0], axes[2, 1], axes[2, 2] = c * fx - s * ex, c * fy - s * ey, c * fz - s * ez
     return area * (high - low)
 
 

@@ -51,11 +51,14 @@ class Decomposition:
         volume_error: (sum of the pieces' volumes) / (the body's volume) - 1; NaN when the body is not watertight.
         protrusion: largest distance [m] of a point of the pieces' surfaces outside the body from its surface, to
             within 0.1 % of the body's extent; of any point of them when the body is not watertight.
+        missed: largest distance [m] by which a corner of the body lies outside the pieces, measured to the nearest
+            piece's planes; thin parts can be lost altogether, and contacts with them are then not seen.
     """
 
     pieces: tuple[Array, ...]
     volume_error: float
     protrusion: float
+    missed: float
 
 
 def decompose(solid: Solid) -> Decomposition:
@@ -68,14 +71,14 @@ def decompose(solid: Solid) -> Decomposition:
         InvalidValue: the solid has no triangles, or is flat and has no pieces of its own.
     """
     if solid.pieces:
-        return Decomposition(solid.pieces, 0.0, 0.0)
+        return Decomposition(solid.pieces, 0.0, 0.0, 0.0)
     if len(solid.triangles) == 0 or convex_hull(solid.vertices) is None:
         raise InvalidValue("solid", f"{len(solid.triangles)} triangles", "a body without volume has no convex pieces")
     entry = _cache_entry(solid)
     kept = _read(entry)
     if kept is None:
         pieces = _decompose(solid.triangles)
-        kept = Decomposition(pieces, _volume_error(solid, pieces), _protrusion(solid, pieces))
+        kept = Decomposition(pieces, _volume_error(solid, pieces), _protrusion(solid, pieces), _missed(solid, pieces))
         _write(entry, kept)
     return kept
 
@@ -88,8 +91,9 @@ def _decompose(triangles: Array) -> tuple[Array, ...]:
     faces = corners.reshape(-1, 3)
     cells = np.column_stack([np.full(len(faces), 3), faces]).astype(np.uint32).ravel()  # each led by its corner count
     hulls = vhacdx.compute_vhacd(vertices, cells, maxConvexHulls=MAX_PIECES, resolution=RESOLUTION, asyncACD=False)
-    pieces = (np.unique(np.asarray(points, dtype=np.float64) + 0.0, axis=0) for points, _ in hulls)
-    return tuple(centre + scale * piece for piece in pieces if convex_hull(piece) is not None)
+    pieces = [np.unique(np.asarray(points, dtype=np.float64) + 0.0, axis=0) for points, _ in hulls]
+    solid = [piece for piece in pieces if convex_hull(piece) is not None]  # a thinner body than a voxel may leave none
+    return tuple(centre + scale * piece for piece in solid or [vertices])
 
 
 def _hull_triangles(piece: Array) -> Array:
@@ -107,6 +111,23 @@ def _protrusion(solid: Solid, pieces: tuple[Array, ...]) -> float:
     faces = np.ascontiguousarray(np.concatenate([_hull_triangles(piece) for piece in pieces]))
     slack = PROTRUSION_TOLERANCE * float(np.ptp(solid.vertices, axis=0).max())
     return float(_furthest(faces, solid.triangles, triangle_tree(solid.triangles), solid.watertight, slack))
+
+
+def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
+    corners = solid.vertices
+    outside = np.full(len(corners), np.inf)
+    for piece in pieces:
+        a, b, c = np.moveaxis(_hull_triangles(piece), 1, 0)
+        normals = np.cross(b - a, c - a)
+        lengths = np.sqrt(np.sum(normals * normals, axis=1))
+        furthest = np.zeros(len(corners))
+        for corner, normal, length in zip(a, normals, lengths, strict=True):
+            if length > 0.0:
+                seen = corners - corner
+                height = seen[:, 0] * normal[0] + seen[:, 1] * normal[1] + seen[:, 2] * normal[2]
+                np.maximum(furthest, height / length, out=furthest)
+        np.minimum(outside, furthest, out=outside)
+    return float(outside.max())
 
 
 @kernel
@@ -175,7 +196,8 @@ def _read(entry: Path | None) -> Decomposition | None:
         with entry.open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
             vertices, first = kept["vertices"], kept["first"]
             pieces = tuple(vertices[a:b].copy() for a, b in itertools.pairwise(first.tolist()))
-            return Decomposition(pieces, float(kept["volume_error"]), float(kept["protrusion"]))
+            figures = (float(kept[name]) for name in ("volume_error", "protrusion", "missed"))
+            return Decomposition(pieces, *figures)
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):  # none yet, or damaged
         return None
 
@@ -195,6 +217,7 @@ def _write(entry: Path | None, result: Decomposition) -> None:
                     first=np.concatenate([[0], np.cumsum([len(piece) for piece in result.pieces])]),
                     volume_error=result.volume_error,
                     protrusion=result.protrusion,
+                    missed=result.missed,
                 )
             Path(part).replace(entry)
         except BaseException:

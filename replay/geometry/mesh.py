@@ -6,7 +6,7 @@ import io
 import math
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from replay.errors import InvalidValue, MeshError
 from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.solid import Solid, signed_volume
+from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
+from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
 from replay.numerics.jit import kernel
 
 Array = NDArray[np.float64]
@@ -86,25 +88,28 @@ def solid_from_triangles(triangles: Array) -> Solid:
     if dropped:
         notes.append(f"{dropped} of {len(triangles)} triangles have no area and were dropped")
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
-    topology = _topology(triangles)
+    faces = corner_indices(triangles)
+    joints = topology(faces)
+    if joints.open_edges == 0 and joints.reversed_edges:
+        turned = wound_against_neighbours(faces)
+        faces[turned] = faces[turned][:, [0, 2, 1]]
+        if topology(faces).is_closed:
+            joints = topology(faces)
+            triangles[turned] = triangles[turned][:, [0, 2, 1]]
+            notes.append(f"{np.count_nonzero(turned)} triangles were wound against their neighbours and turned over")
     triangles = np.ascontiguousarray(triangles[~flat])
-    if topology.open_edges:
-        notes.append(f"not watertight: {topology.open_edges} edges are open; it has no inside, only a surface")
-    elif topology.reversed_edges:
+    if joints.open_edges:
+        notes.append(f"not watertight: {joints.open_edges} edges are open; it has no inside, only a surface")
+    elif joints.reversed_edges:
         notes.append(
-            f"not watertight: neighbouring triangles are wound against each other along {topology.reversed_edges} edges"
+            f"not watertight: neighbouring triangles are wound against each other along {joints.reversed_edges} edges"
         )
-    watertight = topology.open_edges == 0 and topology.reversed_edges == 0
+    watertight = joints.is_closed
     if watertight and signed_volume(triangles) < 0.0:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         notes.append("inside out (its volume is negative): the triangles were turned over")
     pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
     return Solid(triangles, pieces=pieces, watertight=watertight, dropped=dropped, notes=tuple(notes))
-
-
-class _Topology(NamedTuple):
-    open_edges: int  # edges with an odd number of triangles
-    reversed_edges: int  # others that are not walked equally often both ways
 
 
 def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
@@ -142,21 +147,6 @@ def _have_area(triangles: Array) -> NDArray[np.bool_]:
     return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * np.finfo(np.float64).eps))
 
 
-def _topology(triangles: Array) -> _Topology:
-    """Count what keeps the surface from being closed and wound one way; corners are one where they are equal."""
-    _, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    face = corner.reshape(-1, 3).astype(np.int64)
-    start, end = face.ravel(), face[:, [1, 2, 0]].ravel()
-    keep = start != end
-    start, end = start[keep], end[keep]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    _, edge = np.unique(low * (face.max() + 1) + high, return_inverse=True)
-    total = np.bincount(edge)
-    balance = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
-    odd = total % 2 == 1
-    return _Topology(int(np.count_nonzero(odd)), int(np.count_nonzero(~odd & (balance != 0.0))))
-
-
 def _convex_corners(triangles: Array) -> Array:
     points = np.unique(triangles.reshape(-1, 3), axis=0)
     hull = convex_hull(points)
@@ -167,19 +157,38 @@ def _is_convex(triangles: Array) -> bool:
     """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane."""
     local, _, scale = to_unit_box(triangles.reshape(-1, 3))
     slack = _FILE_ROUNDING * float(np.max(np.abs(triangles))) / scale
-    return bool(_all_below(local.reshape(-1, 3, 3), _convex_corners(local.reshape(-1, 3, 3)), slack))
+    corners = _convex_corners(local.reshape(-1, 3, 3))
+    return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
 
 
 @kernel
-def _all_below(triangles: Array, points: Array, slack: float) -> bool:
-    """Return whether no point is further than slack outside the plane of any triangle (all of some area)."""
+def _all_below(triangles: Array, points: Array, tree: Tree, slack: float) -> bool:
+    """Return whether no point is further than slack outside the plane of any triangle (all of some area).
+
+    Of a box of points, no point is further out than the corner that is furthest along the normal.
+    """
+    waiting = np.empty(MAX_DEPTH, np.int64)
     for t in range(len(triangles)):
-        ax, ay, az = triangles[t, 0]
+        ax, ay, az = triangles[t, 0, 0], triangles[t, 0, 1], triangles[t, 0, 2]
         ux, uy, uz = triangles[t, 1, 0] - ax, triangles[t, 1, 1] - ay, triangles[t, 1, 2] - az
         vx, vy, vz = triangles[t, 2, 0] - ax, triangles[t, 2, 1] - ay, triangles[t, 2, 2] - az
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         limit = slack * np.sqrt(nx * nx + ny * ny + nz * nz)
-        for k in range(len(points)):
-            if nx * (points[k, 0] - ax) + ny * (points[k, 1] - ay) + nz * (points[k, 2] - az) > limit:
-                return False
+        waiting[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            node = waiting[size]
+            low, high = tree.lower[node], tree.upper[node]
+            x, y, z = high[0] if nx > 0.0 else low[0], high[1] if ny > 0.0 else low[1], high[2] if nz > 0.0 else low[2]
+            if nx * (x - ax) + ny * (y - ay) + nz * (z - az) <= limit:
+                continue
+            if tree.second[node] >= 0:
+                waiting[size], waiting[size + 1] = tree.second[node], node + 1
+                size += 2
+                continue
+            for k in range(tree.begin[node], tree.end[node]):
+                p = points[tree.order[k]]
+                if nx * (p[0] - ax) + ny * (p[1] - ay) + nz * (p[2] - az) > limit:
+                    return False
     return True

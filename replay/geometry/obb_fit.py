@@ -24,8 +24,13 @@ from replay.geometry.solid import signed_volume
 Array = NDArray[np.float64]
 Number = TypeVar("Number", bound=np.generic)
 
-NEARLY_REPEATED = 0.1
-"""Neighbouring eigenvalues whose difference is below this times the larger count as repeated."""
+NEARLY_REPEATED = 0.3
+"""Neighbouring eigenvalues whose difference is at most this times the larger count as repeated.
+
+Measured on cubes, octahedra, tetrahedra and cylinders that are stretched by up to 10 % in three directions: the worst
+box has 3.9, 3.4, 2.9 and 1.0 times the smallest volume at a threshold of 0.02, 0.1, 0.2 and 0.3. Hulls of 20 random
+points, which have no axes to be found, are at most 1.9 times as large as need be at any threshold up to 0.3.
+"""
 
 _FLAT = 1e-14  # eigenvalues this far below the largest are rounding: the set is thinner than 1e-7 of its extent
 _TRIALS = (400, 40)  # axes tried on small hulls, and on hulls of thousands of vertices

@@ -75,15 +75,18 @@ def eigen(matrix: Array) -> tuple[Array, Array]:
 
     The vectors are a product of rotations, so they are orthonormal whether or not values repeat.
     """
-    a = matrix.copy()
-    v = np.eye(3)
+    a, v = np.empty((3, 3)), np.zeros((3, 3))
+    for i in range(3):
+        v[i, i] = 1.0
+        for j in range(3):
+            a[i, j] = matrix[i, j]
     for _ in range(_SWEEPS):
         if a[0, 1] == 0.0 and a[0, 2] == 0.0 and a[1, 2] == 0.0:
             break
         for p in range(2):
             for q in range(p + 1, 3):
                 if abs(a[p, q]) <= 1e-18 * (abs(a[p, p]) + abs(a[q, q])):
-                    a[p, q] = a[q, p] = 0.0
+                    a[p, q], a[q, p] = 0.0, 0.0
                     continue
                 theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
                 t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
@@ -99,6 +102,13 @@ def eigen(matrix: Array) -> tuple[Array, Array]:
                 for k in range(3):
                     x, y = v[p, k], v[q, k]
                     v[p, k], v[q, k] = c * x - s * y, s * x + c * y
-    values = np.array([a[0, 0], a[1, 1], a[2, 2]])
-    order = np.argsort(values, kind="mergesort")
-    return values[order], v[order]
+    values, vectors = np.empty(3), np.empty((3, 3))
+    for i in range(3):
+        rank = 0
+        for j in range(3):
+            if a[j, j] < a[i, i] or (a[j, j] == a[i, i] and j < i):
+                rank += 1
+        values[rank] = a[i, i]
+        for k in range(3):
+            vectors[rank, k] = v[i, k]
+    return values, vectors

@@ -3,8 +3,8 @@
 Built from the top by the surface area heuristic (Goldsmith and Salmon 1987): the cost of testing a node's children is
 proportional to the chance that a random query which meets the node meets them, which is the ratio of surface areas.
 Centres are sorted into `_BINS` bins on each axis and the cheapest of the planes between the bins is taken (Wald 2007).
-Such a tree can be as deep as it has parts, so below `_FREE_LEVELS` levels parts are halved by count, which bounds the
-depth and lets traversals keep their stack in a fixed array.
+Such a tree can be as deep as it has parts, so below `_FREE_LEVELS` levels, and where all centres are one, parts are
+halved by count. That bounds the depth and lets traversals keep their stack in a fixed array.
 """
 
 from __future__ import annotations
@@ -64,7 +64,19 @@ def build_tree(lower: Floats, upper: Floats, *, leaf_size: int = 4) -> Tree:
         raise InvalidValue("lower, upper", "boxes", "must be finite with lower <= upper")
     if leaf_size < 1:
         raise InvalidValue("leaf_size", leaf_size, "must be at least 1")
-    return Tree(*_build(lower, upper, int(leaf_size)))
+    n = len(lower)
+    order = np.arange(n, dtype=np.int64)
+    boxes, nodes = np.empty((2 * n - 1, 6)), np.empty((2 * n - 1, 3), dtype=np.int64)
+    count = _build(lower, upper, 0.5 * lower + 0.5 * upper, int(leaf_size), order, np.empty_like(order), boxes, nodes)
+    boxes, nodes = boxes[:count], nodes[:count]
+    return Tree(
+        lower=np.ascontiguousarray(boxes[:, :3]),
+        upper=np.ascontiguousarray(boxes[:, 3:]),
+        second=np.ascontiguousarray(nodes[:, 0]),
+        begin=np.ascontiguousarray(nodes[:, 1]),
+        end=np.ascontiguousarray(nodes[:, 2]),
+        order=order,
+    )
 
 
 def triangle_tree(triangles: Floats, *, leaf_size: int = 4) -> Tree:
@@ -89,9 +101,9 @@ def _grow(box: Floats, low: Floats, high: Floats) -> None:
 
 
 @kernel
-def _clear(boxes: Floats) -> None:
-    boxes[:, :3] = np.inf
-    boxes[:, 3:] = -np.inf
+def _clear(box: Floats) -> None:
+    for axis in range(3):
+        box[axis], box[axis + 3] = np.inf, -np.inf
 
 
 @kernel
@@ -109,22 +121,24 @@ def _best_plane(
     end: int,
     box: Floats,
     bins: Floats,
+    sweep: Floats,
     counts: Ints,
     behind: Floats,
 ) -> tuple[int, int]:
     """Return (axis, plane): parts whose centre's bin is at most `plane` go first; axis -1 when no plane divides them.
 
-    `box` (6,) bounds the parts' centres; `bins` (_BINS, 6), `counts` (_BINS,) and `behind` (_BINS,) are scratch.
+    `box` (6,) bounds the parts' centres; `bins` (_BINS, 6), `sweep` (6,), `counts` and `behind` (_BINS,) are
+    scratch.
     """
     best_axis, best_plane, best_cost, best_tilt = -1, 0, np.inf, end - begin
-    sweep = np.empty((1, 6))
     for axis in range(3):
         extent = box[axis + 3] - box[axis]
         scale = _BINS / extent if extent > 0.0 else 0.0
         if not (0.0 < scale < np.inf):
             continue
-        _clear(bins)
-        counts[:] = 0
+        for b in range(_BINS):
+            _clear(bins[b])
+            counts[b] = 0
         for k in range(begin, end):
             part = order[k]
             b = _bin_of(centres[part, axis], box[axis], scale)
@@ -134,16 +148,16 @@ def _best_plane(
         total = 0
         for b in range(_BINS - 1, 0, -1):
             total += counts[b]
-            _grow(sweep[0], bins[b, :3], bins[b, 3:])
-            behind[b] = total * _half_area(sweep[0]) if total > 0 else 0.0
+            _grow(sweep, bins[b], bins[b, 3:])
+            behind[b] = total * _half_area(sweep) if total > 0 else 0.0
         _clear(sweep)
         total = 0
         for b in range(_BINS - 1):
             total += counts[b]
-            _grow(sweep[0], bins[b, :3], bins[b, 3:])
+            _grow(sweep, bins[b], bins[b, 3:])
             if total == 0 or total == end - begin:
                 continue
-            cost = total * _half_area(sweep[0]) + behind[b + 1]
+            cost = total * _half_area(sweep) + behind[b + 1]
             tilt = abs(end - begin - 2 * total)
             if cost < best_cost or (cost == best_cost and tilt < best_tilt):
                 best_axis, best_plane, best_cost, best_tilt = axis, b, cost, tilt
@@ -170,54 +184,47 @@ def _partition(
 
 
 @kernel
-def _build(lower: Floats, upper: Floats, leaf_size: int) -> tuple[Floats, Floats, Ints, Ints, Ints, Ints]:
-    n = len(lower)
-    centres = 0.5 * lower + 0.5 * upper
-    order, spare = np.arange(n), np.empty(n, np.int64)
-    node_lower, node_upper = np.empty((2 * n - 1, 3)), np.empty((2 * n - 1, 3))
-    second, begins, ends = np.empty(2 * n - 1, np.int64), np.empty(2 * n - 1, np.int64), np.empty(2 * n - 1, np.int64)
-    bins, counts, behind = np.empty((_BINS, 6)), np.empty(_BINS, np.int64), np.empty(_BINS)
-    boxes = np.empty((2, 6))  # of a node's parts, and of their centres
+def _build(
+    lower: Floats,
+    upper: Floats,
+    centres: Floats,
+    leaf_size: int,
+    order: Ints,
+    spare: Ints,
+    node_boxes: Floats,
+    nodes: Ints,
+) -> int:
+    """Write the nodes' boxes (lower, upper) and (second, begin, end), sort `order`, and return the number of nodes."""
+    bins, sweep, counts, behind = np.empty((_BINS, 6)), np.empty(6), np.empty(_BINS, np.int64), np.empty(_BINS)
+    box = np.empty(6)  # of a node's centres
     waiting = np.empty((MAX_DEPTH, 4), np.int64)  # begin, end, depth, the node whose second child it is or -1
-    waiting[0] = (0, n, 0, -1)
-    size, nodes = 1, 0
+    waiting[0, 0], waiting[0, 1], waiting[0, 2], waiting[0, 3] = 0, len(lower), 0, -1
+    size, count = 1, 0
     while size > 0:
         size -= 1
-        begin, end, depth, parent = waiting[size]
-        node = nodes
-        nodes += 1
+        begin, end, depth, parent = waiting[size, 0], waiting[size, 1], waiting[size, 2], waiting[size, 3]
+        node = count
+        count += 1
         if parent >= 0:
-            second[parent] = node
-        _clear(boxes)
+            nodes[parent, 0] = node
+        _clear(node_boxes[node])
+        _clear(box)
         for k in range(begin, end):
             part = order[k]
-            _grow(boxes[0], lower[part], upper[part])
-            _grow(boxes[1], centres[part], centres[part])
-        node_lower[node], node_upper[node] = boxes[0, :3], boxes[0, 3:]
-        begins[node], ends[node], second[node] = begin, end, -1
+            _grow(node_boxes[node], lower[part], upper[part])
+            _grow(box, centres[part], centres[part])
+        nodes[node, 0], nodes[node, 1], nodes[node, 2] = -1, begin, end
         if end - begin <= leaf_size:
             continue
         axis, plane = -1, 0
         if depth < _FREE_LEVELS:
-            axis, plane = _best_plane(lower, upper, centres, order, begin, end, boxes[1], bins, counts, behind)
+            axis, plane = _best_plane(lower, upper, centres, order, begin, end, box, bins, sweep, counts, behind)
         if axis >= 0:
-            low = boxes[1, axis]
-            middle = _partition(centres, order, begin, end, axis, plane, low, _BINS / (boxes[1, axis + 3] - low), spare)
+            scale = _BINS / (box[axis + 3] - box[axis])
+            middle = _partition(centres, order, begin, end, axis, plane, box[axis], scale, spare)
         else:
-            widest = np.argmax(boxes[1, 3:] - boxes[1, :3])
-            keys = np.empty(end - begin)
-            for k in range(begin, end):
-                keys[k - begin] = centres[order[k], widest]
-            order[begin:end] = order[begin:end][np.argsort(keys, kind="mergesort")]
             middle = begin + (end - begin + 1) // 2
-        waiting[size] = (middle, end, depth + 1, node)
-        waiting[size + 1] = (begin, middle, depth + 1, -1)
-        size += 2
-    return (
-        node_lower[:nodes].copy(),
-        node_upper[:nodes].copy(),
-        second[:nodes].copy(),
-        begins[:nodes].copy(),
-        ends[:nodes].copy(),
-        order,
-    )
+        for first, last, owner in ((middle, end, node), (begin, middle, -1)):
+            waiting[size, 0], waiting[size, 1], waiting[size, 2], waiting[size, 3] = first, last, depth + 1, owner
+            size += 1
+    return count

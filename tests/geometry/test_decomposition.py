@@ -39,11 +39,13 @@ def test_phantom_twice_and_from_cache(cache: Path) -> None:
     entry.write_bytes(entry.read_bytes()[:100])  # damaged: computed again, and repaired
     again = decompose(solid)
     for other in (kept, again):
-        assert (other.volume_error, other.protrusion) == (first.volume_error, first.protrusion)
+        figures = (other.volume_error, other.protrusion, other.missed)
+        assert figures == (first.volume_error, first.protrusion, first.missed)
         for mine, theirs in zip(first.pieces, other.pieces, strict=True):
             np.testing.assert_array_equal(mine, theirs)
     assert 0.0 < first.volume_error < 0.3
     assert 0.003 < first.protrusion < 0.05
+    assert 0.0 < first.missed < 0.05
     assert [path.suffix for path in cache.rglob("*") if path.is_file()] == [".npz"]
     assert entry.stat().st_size > 1000
     sets = convex_sets(solid, pieces="convex")
@@ -69,8 +71,10 @@ def test_known_figures() -> None:
     bridge = (np.concatenate([apart.vertices]),)  # one hull over both cubes
     assert decomposition._volume_error(apart, bridge) == pytest.approx(0.5, rel=1e-12)
     assert decomposition._protrusion(apart, bridge) == pytest.approx(0.5, abs=3e-3)  # the middle of the gap
+    assert decomposition._missed(apart, bridge) <= 1e-15
+    assert decomposition._missed(apart, (primitives.cube(1.0).vertices,)) == pytest.approx(2.0)  # x up to 2.5, not 0.5
     exact = decompose(primitives.arc(0.8, 2.5, 0.2, 0.1, 1e-3))
-    assert (exact.volume_error, exact.protrusion) == (0.0, 0.0) and len(exact.pieces) > 10
+    assert (exact.volume_error, exact.protrusion, exact.missed) == (0.0, 0.0, 0.0) and len(exact.pieces) > 10
 
 
 def test_size_and_place_do_not_matter() -> None:

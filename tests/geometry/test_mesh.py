@@ -82,14 +82,43 @@ def test_repairs_are_noted() -> None:
     assert not hole.watertight and "3 edges are open" in hole.notes[0] and hole.pieces == ()
     assert not convex_sets(hole).surface
 
-    twisted = cube.triangles.copy()
-    twisted[0] = twisted[0, ::-1]
-    assert "wound against each other along 3 edges" in solid_from_triangles(twisted).notes[0]
-
     point, line = np.ones((1, 3, 3)), np.array([[[0.0, 0, 0], [1, 1, 1], [3, 3, 3]]])
     padded = solid_from_triangles(np.concatenate([cube.triangles, point]))
     assert padded.dropped == 1 and padded.watertight and len(padded.triangles) == 12
     assert solid_from_triangles(np.concatenate([cube.triangles, line])).dropped == 1
+
+
+def test_winding_is_repaired() -> None:
+    rng = np.random.default_rng(2)
+    ring = primitives.arc(0.8, 2 * np.pi, 0.2, 0.1, 1e-3)
+    cavity = primitives.sphere(1.0, 0.01).triangles[:, ::-1]
+    ball = primitives.sphere(2.0, 0.01).triangles
+    for whole in (ring.triangles, np.concatenate([ball, cavity])):
+        mixed = whole.copy()
+        turned = rng.uniform(size=len(mixed)) < 0.3
+        mixed[turned] = mixed[turned, ::-1]
+        solid = solid_from_triangles(mixed)
+        assert solid.watertight and f"{turned.sum()} triangles were wound against" in solid.notes[0]
+        assert solid.volume == pytest.approx(solid_from_triangles(whole).volume, rel=1e-12)
+
+
+def test_one_sided_surface_is_not_watertight() -> None:
+    """A projective plane of six corners: closed, but no winding fits."""
+    faces = [
+        (0, 1, 2),
+        (0, 2, 3),
+        (0, 3, 4),
+        (0, 4, 5),
+        (0, 5, 1),
+        (1, 2, 4),
+        (2, 3, 5),
+        (3, 4, 1),
+        (4, 5, 2),
+        (5, 1, 3),
+    ]
+    corners = np.random.default_rng(1).normal(size=(6, 3))
+    solid = solid_from_triangles(corners[np.array(faces)])
+    assert not solid.watertight and "wound against each other" in solid.notes[0]
 
 
 def test_flat_stitch_keeps_the_surface_closed() -> None:
