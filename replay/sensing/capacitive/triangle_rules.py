@@ -23,7 +23,7 @@ _THRIFT = 0.25
 
 
 FITS, NEAR, CROSSES_X, CROSSES_Y, CROSSES_Z = range(5)
-"""Verdicts on a point rule: it fits; the triangle is too near for it; a border in x, in y, or z = 0 must be cut first."""
+"""Verdicts on a point rule: it fits; the triangle is too near; a border in x, in y, or z = 0 must be cut first."""
 
 _RULE_3, _RULE_7, _RULE_16 = 0.12, 0.065, 0.005
 """Error constants of the point rules, twice the worst of 20 000 triangles (slivers too) at h/r = 0.06..0.5 in regions
