@@ -158,7 +158,8 @@ def _share(a: Floats, b: Floats, c: Floats) -> float:
         first = SHARE_A
     elif in_c >= in_a:
         second = SHARE_A
-    return abs((b[first] - a[first]) * (c[second] - a[second]) - (b[second] - a[second]) * (c[first] - a[first]))
+    share = (b[first] - a[first]) * (c[second] - a[second]) - (b[second] - a[second]) * (c[first] - a[first])
+    return abs(share)  # type: ignore[no-any-return]
 
 
 @kernel

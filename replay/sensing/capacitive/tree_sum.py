@@ -196,7 +196,7 @@ def _reach(node: Floats, T: Floats, axis: int, sign: float) -> float:
     for k in range(3):
         e = sign * T[axis, k]
         reach += e * (node[UPPER + k] if e > 0.0 else node[LOWER + k])
-    return min(reach, node[RADIUS])
+    return min(reach, node[RADIUS])  # type: ignore[no-any-return]
 
 
 @kernel

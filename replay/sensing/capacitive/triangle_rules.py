@@ -14,7 +14,6 @@ from replay.sensing.capacitive.exact import integral_over_triangle
 from replay.sensing.capacitive.triangle_sum import faces_centre
 
 Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
 
 _GREED = 8.0
 """A node may take up to this many times its own share of the budget, if earlier nodes have left it."""
@@ -23,8 +22,8 @@ _THRIFT = 0.25
 """Largest part of what earlier nodes have left that one node may take."""
 
 
-FITS, NEAR, CROSSES_X, CROSSES_Y = range(4)
-"""Verdicts on a point rule: it fits; the triangle is too near for it; a border in x or y must be cut first."""
+FITS, NEAR, CROSSES_X, CROSSES_Y, CROSSES_Z = range(5)
+"""Verdicts on a point rule: it fits; the triangle is too near; a border in x, in y, or z = 0 must be cut first."""
 
 _RULE_3, _RULE_7, _RULE_16 = 0.12, 0.065, 0.005
 """Error constants of the point rules, twice the worst of 20 000 triangles (slivers too) at h/r = 0.06..0.5 in regions
@@ -70,23 +69,23 @@ def triangle_within(
         for axis in range(3):
             pieces[0, k, axis] = corners[k, axis]
     pieces[0, 3, 0] = area
-    size = 1
-    if not both and min(z0, z1, z2) < 0.0:
-        size = 0 if touches else _cut(pieces, 1, 2, 0.0, True)
-    near = size == 0
+    size, near = 1, False
+    verdict = CROSSES_Z if not both and min(z0, z1, z2) < 0.0 else FITS
+    if verdict == CROSSES_Z and touches:
+        near = True
     while size > 0 and not near:
         piece = pieces[size - 1]
-        value, own, e, verdict = _by_points(piece, piece[3, 0], half_x, half_y, rtol, saved)
+        if verdict != CROSSES_Z:
+            value, own, e, verdict = _by_points(piece, piece[3, 0], half_x, half_y, rtol, saved)
         if verdict == FITS:
             total, share, error = total + value, share + own, error + e
             saved += own - e
             size -= 1
-        elif verdict == CROSSES_X:
-            size = _cut(pieces, size, 0, _border_between(piece, 0, half_x), False)
-        elif verdict == CROSSES_Y:
-            size = _cut(pieces, size, 1, _border_between(piece, 1, half_y), False)
-        else:
+        elif verdict == NEAR:
             near = True
+        else:
+            size = _cut(pieces, size, verdict - CROSSES_X, half_x, half_y)
+            verdict = FITS
     if not near:
         return total, share, error, touches
     value = integral_over_triangle(corners, area, half_x, half_y, both, scratch)
@@ -94,16 +93,17 @@ def triangle_within(
 
 
 @kernel
-def _border_between(piece: Floats, axis: int, half: float) -> float:
-    """Return the border, half or -half, that has corners on both sides."""
-    low, high = min(piece[0, axis], piece[1, axis], piece[2, axis]), max(piece[0, axis], piece[1, axis], piece[2, axis])
-    return half if low < half < high else -half
+def _cut(pieces: Floats, size: int, axis: int, half_x: float, half_y: float) -> int:
+    """Replace the last piece by its parts on either side of a border across an axis, or by those above z = 0.
 
-
-@kernel
-def _cut(pieces: Floats, size: int, axis: int, border: float, only_beyond: bool) -> int:
-    """Replace the last piece by its two or three parts on either side of a plane; return the new number of pieces."""
+    Returns the new number of pieces.
+    """
     last = pieces[size - 1]
+    only_beyond = axis == 2
+    border = 0.0 if only_beyond else (half_x if axis == 0 else half_y)
+    low, high = min(last[0, axis], last[1, axis], last[2, axis]), max(last[0, axis], last[1, axis], last[2, axis])
+    if not low < border < high:
+        border = -border
     beyond_0, beyond_1, beyond_2 = last[0, axis] > border, last[1, axis] > border, last[2, axis] > border
     alone = 0 if beyond_1 == beyond_2 else (1 if beyond_0 == beyond_2 else 2)
     area = last[3, 0]
@@ -119,20 +119,17 @@ def _cut(pieces: Floats, size: int, axis: int, border: float, only_beyond: bool)
     p = (border if axis == 0 else p[0], border if axis == 1 else p[1], border if axis == 2 else p[2])
     q = (border if axis == 0 else q[0], border if axis == 1 else q[1], border if axis == 2 else q[2])
     size -= 1
-    if is_beyond or not only_beyond:
-        size = _put(pieces, size, (ax, ay, az), p, q, area * s * t)
-    if not is_beyond or not only_beyond:
-        size = _put(pieces, size, (bx, by, bz), (cx, cy, cz), q, area * (1.0 - t))
-        size = _put(pieces, size, (bx, by, bz), q, p, area * t * (1.0 - s))
+    for part in range(3):
+        if only_beyond and is_beyond != (part == 0):
+            continue
+        first = (ax, ay, az) if part == 0 else (bx, by, bz)
+        second = p if part == 0 else ((cx, cy, cz) if part == 1 else q)
+        third = p if part == 2 else q
+        for k in range(3):
+            pieces[size, 0, k], pieces[size, 1, k], pieces[size, 2, k] = first[k], second[k], third[k]
+        pieces[size, 3, 0] = area * (s * t if part == 0 else (1.0 - t if part == 1 else t * (1.0 - s)))
+        size += 1
     return size
-
-
-@kernel
-def _put(pieces: Floats, size: int, a: Triple, b: Triple, c: Triple, area: float) -> int:
-    for axis in range(3):
-        pieces[size, 0, axis], pieces[size, 1, axis], pieces[size, 2, axis] = a[axis], b[axis], c[axis]
-    pieces[size, 3, 0] = area
-    return size + 1
 
 
 @kernel
