@@ -14,8 +14,8 @@ h the largest distance of a corner from the centroid, d a point's place about it
 - A cluster takes orders 0, 2, 3, 4 from its moments (order 1 vanishes at the centroid):
   E = A spread4 h / (r^6 (1 - x)), spread4 the mean of |d|^4.
 - Part of it may lie over a border, by at most w: there 1/dist is expanded in the wrong region's form, whose squared
-  distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3), mean(w^2) <= min(largest w^2, variance across the
-  border). No cluster is clipped for it.
+  distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3). A point at d across the border, of at most D, lies
+  over it by w <= d (W/D), W the largest w: mean(w^2) <= min(W^2, (W/D)^2 mean(d^2)). No cluster is clipped for it.
 - A single triangle takes the first that fits of: 1 point, E = A spread2/(r - h)^3, borders or not, as the Hessian of
   1/dist is at most 2/dist^3; 3 points of degree 2, E = c A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4
   spread2/(r^7 (1 - x)); 16 points of degree 8, E = c A h^7 spread2/(r^10 (1 - x)); all but the first plus the border's
@@ -242,12 +242,13 @@ def _border(node: Floats, moments: Floats, T: Floats, axis: int, position: float
         sign = 1.0 - 2.0 * side
         # towards the border at sign x half, from whichever side of it the centroid is on
         gap = half - sign * position
-        beyond = _reach(node, T, axis, sign if gap >= 0.0 else -sign) - abs(gap)
+        reach = _reach(node, T, axis, sign if gap >= 0.0 else -sign)
+        beyond = reach - abs(gap)
         if beyond > 0.0:
             a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
             variance = a * a * moments[SECOND] + b * b * moments[SECOND + 1] + c * c * moments[SECOND + 2]
             variance += 2.0 * (a * b * moments[SECOND + 3] + a * c * moments[SECOND + 4] + b * c * moments[SECOND + 5])
-            over += min(beyond * beyond, variance)
+            over += min(beyond * beyond, variance * (beyond / reach) ** 2)
     return over
 
 

@@ -143,45 +143,46 @@ def _by_points(
     u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
     v = y - math.copysign(half_y, y) if abs(y) > half_y else 0.0
     r = math.sqrt(u * u + v * v + z * z)
-    squares, largest, variance_x, variance_y, over_x, over_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    squares, largest = 0.0, 0.0
     for k in range(3):
         dx, dy, dz = corners[k, 0] - x, corners[k, 1] - y, corners[k, 2] - z
         square = dx * dx + dy * dy + dz * dz
         squares += square
         largest = max(largest, square)
-        variance_x += dx * dx / 12.0
-        variance_y += dy * dy / 12.0
-        over_x = max(over_x, _over(corners[k, 0], u, x, half_x))
-        over_y = max(over_y, _over(corners[k, 1], v, y, half_y))
-    h, spread = math.sqrt(largest), squares / 12.0
-    if r <= 2.0 * h:
+    if r * r <= 4.0 * largest:
         return 0.0, 0.0, 0.0, NEAR
+    h, spread = math.sqrt(largest), squares / 12.0
     share = rtol * area / (r + h)
     allowed = allowance(share, saved)
-    nearest = r - h
-    cube = area * spread / (nearest * nearest * nearest)
+    nearest = 1.0 / (r - h)
+    cube = area * spread * nearest * nearest * nearest
     if cube <= allowed:
         return area / r, share, cube, FITS
-    ratio = h / r
-    cube = area * spread / (r * r * nearest)
-    best = _RULE_16 * cube * ratio**7
-    if best > allowed:
+    inverse = 1.0 / r
+    ratio = h * inverse
+    smooth = area * spread * nearest * inverse * inverse
+    ratio_3 = ratio * ratio * ratio
+    error_3, error_7 = _RULE_3 * smooth * ratio, _RULE_7 * smooth * ratio_3 * ratio
+    error_16 = _RULE_16 * smooth * ratio_3 * ratio_3 * ratio
+    if error_16 > allowed:
         return 0.0, 0.0, 0.0, NEAR
-    border_x = area * min(over_x * over_x, variance_x) / (2.0 * nearest**3)
-    border_y = area * min(over_y * over_y, variance_y) / (2.0 * nearest**3)
-    border = border_x + border_y
-    if border + best > allowed:
-        return 0.0, 0.0, 0.0, (CROSSES_X if border_x >= border_y else CROSSES_Y)
+    border = 0.0
+    if abs(abs(x) - half_x) < h or abs(abs(y) - half_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
+        border_x = 0.5 * area * _border(corners, 0, x, half_x) * nearest * nearest * nearest
+        border_y = 0.5 * area * _border(corners, 1, y, half_y) * nearest * nearest * nearest
+        border = border_x + border_y
+        if border + error_16 > allowed:
+            return 0.0, 0.0, 0.0, (CROSSES_X if border_x >= border_y else CROSSES_Y)
     keep_x, keep_y = 0.0 if u == 0.0 else 1.0, 0.0 if v == 0.0 else 1.0
     total = 0.0
-    if border + _RULE_3 * cube * ratio <= allowed:
+    if border + error_3 <= allowed:
         for k in range(3):
             px = u + keep_x * 0.5 * (corners[k, 0] - x)
             py = v + keep_y * 0.5 * (corners[k, 1] - y)
             pz = z + 0.5 * (corners[k, 2] - z)
             total += 1.0 / math.sqrt(px * px + py * py + pz * pz)
-        return area * total / 3.0, share, border + _RULE_3 * cube * ratio, FITS
-    fits_7 = border + _RULE_7 * cube * ratio**4 <= allowed
+        return area * total / 3.0, share, border + error_3, FITS
+    fits_7 = border + error_7 <= allowed
     rule = TRIANGLE_7 if fits_7 else TRIANGLE_16
     for k in range(len(rule)):
         a, b, c = rule[k, 0], rule[k, 1], rule[k, 2]
@@ -189,12 +190,19 @@ def _by_points(
         py = v + keep_y * (a * corners[0, 1] + b * corners[1, 1] + c * corners[2, 1] - y)
         pz = a * corners[0, 2] + b * corners[1, 2] + c * corners[2, 2]
         total += rule[k, 3] / math.sqrt(px * px + py * py + pz * pz)
-    return area * total, share, border + (_RULE_7 * cube * ratio**4 if fits_7 else best), FITS
+    return area * total, share, border + (error_7 if fits_7 else error_16), FITS
 
 
 @kernel
-def _over(position: float, beyond: float, centroid: float, half: float) -> float:
-    """Return how far a corner's coordinate lies outside the slab of the centroid, which is `beyond` the plate."""
-    if beyond == 0.0:
-        return max(abs(position) - half, 0.0)
-    return max(half - math.copysign(1.0, centroid) * position, 0.0)
+def _border(corners: Floats, axis: int, centroid: float, half: float) -> float:
+    """Return a bound of mean(w^2) [m^2], w the depth by which a triangle lies outside its centroid's slab."""
+    over, variance = 0.0, 0.0
+    for k in range(3):
+        offset = corners[k, axis] - centroid
+        variance += offset * offset / 12.0
+        if abs(centroid) > half:
+            over = max(over, half - math.copysign(1.0, centroid) * corners[k, axis])
+        else:
+            over = max(over, abs(corners[k, axis]) - half)
+    gap = abs(abs(centroid) - half)
+    return min(over * over, variance * (over / (over + gap)) ** 2) if over > 0.0 else 0.0
