@@ -6,14 +6,18 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mcap.records
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import RecordingError
+from replay.logs.mcap_reader import McapLog
+from replay.logs.mcap_records import Channel, Schema
+from replay.logs.protobuf import message_type
 
 DEFAULT_TOPIC = "/joint_states"
 
@@ -45,58 +49,70 @@ def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str
     Raises:
         RecordingError: the file is not a whole MCAP file, has no such topic, or the topic is of another kind.
     """
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
-
     found: dict[str, tuple[list[int], list[float]]] = {}
-    topics: set[str] = set()
-    try:
-        reader = make_reader(io.BytesIO(data), validate_crcs=True)
-        summary = reader.get_summary()
-        topics = {channel.topic for channel in summary.channels.values()} if summary else set()
-        decode: dict[int, Any] = {}
-        for schema, channel, message in reader.iter_messages(topics=[topic], log_time_order=False):
-            topics.add(channel.topic)
-            if channel.id not in decode:
-                decode[channel.id] = _decoder(name, topic, schema, channel.message_encoding)
-            stamp, joints = decode[channel.id](message.data)
-            time = stamp or message.log_time
-            for joint, position in joints:
-                times, positions = found.setdefault(joint, ([], []))
-                times.append(time)
-                positions.append(position)
-    except (McapError, ValueError, KeyError, TypeError, EOFError, AttributeError, IndexError, OverflowError) as error:
-        raise RecordingError(name, f"cannot be read as a log of joint states: {error or type(error).__name__}") from None
+    with McapLog(name, data=data) as log:
+        decoders = {
+            channel.id: _decoder(name, channel, log.schemas.get(channel.schema_id))
+            for channel in log.channels.values()
+            if channel.topic == topic
+        }
+        for chunk in log.chunks if decoders else ():
+            for run in log.runs(chunk):
+                if run.channel not in decoders:
+                    continue
+                for time, message in zip(run.time.tolist(), run.messages(), strict=True):
+                    stamp, joints = _decode(name, topic, decoders[run.channel], message)
+                    for joint, position in joints:
+                        times, positions = found.setdefault(joint, ([], []))
+                        times.append(stamp or time)
+                        positions.append(position)
+        topics = sorted({channel.topic for channel in log.channels.values()})
     if not found:
-        raise RecordingError(name, f"has no joint states on topic {topic!r}; its topics are {sorted(topics)}")
+        raise RecordingError(name, f"has no joint states on topic {topic!r}; its topics are {topics}")
     return {joint: JointTrack(np.array(t, dtype=np.int64), np.array(p)) for joint, (t, p) in sorted(found.items())}
 
 
 Sample = tuple[int, list[tuple[str, float]]]
 """Stamp [ns], 0 for none, and the joints with a position."""
+Decoder = Callable[[bytes], Sample]
 
 
-def _decoder(name: str, topic: str, schema: Any, encoding: str) -> Any:
-    """Return what turns a message's bytes into a `Sample`."""
-    kind = schema.name if schema is not None else ""
+def _decoder(name: str, channel: Channel, schema: Schema | None) -> Decoder:
+    """Return what turns the messages of a channel into samples."""
+    kind, encoding = schema.name if schema is not None else "", channel.encoding
     if encoding == "json":
         return _json
-    if encoding == "protobuf" and kind == "foxglove.JointStates":
-        from replay.logs.protobuf import message_type
-
+    if schema is not None and encoding == "protobuf" and kind == "foxglove.JointStates":
         type_ = message_type(name, schema.name, schema.data)
         return lambda data: _foxglove(type_.FromString(data))
-    if encoding == "cdr" and kind in ("sensor_msgs/msg/JointState", "sensor_msgs/JointState"):
-        from mcap_ros2.decoder import DecoderFactory
-
-        factory = DecoderFactory().decoder_for(encoding, schema)
-        if factory is not None:
-            return lambda data: _ros(factory(data))
+    if schema is not None and encoding == "cdr" and kind in ("sensor_msgs/msg/JointState", "sensor_msgs/JointState"):
+        return _ros_decoder(mcap.records.Schema(channel.schema_id, schema.data, schema.encoding, schema.name))
     raise RecordingError(
         name,
-        f"topic {topic!r} holds {kind or 'messages without schema'} as {encoding or 'bytes'}; read are"
+        f"topic {channel.topic!r} holds {kind or 'messages without schema'} as {encoding or 'bytes'}; read are"
         " foxglove.JointStates (protobuf, json) and sensor_msgs/msg/JointState (cdr, json)",
     )
+
+
+def _ros_decoder(schema: mcap.records.Schema) -> Decoder:
+    from mcap_ros2.decoder import DecoderFactory
+
+    decode: Any = None
+
+    def sample(data: bytes) -> Sample:
+        nonlocal decode
+        decode = decode or DecoderFactory().decoder_for("cdr", schema)
+        return _ros(decode(data))
+
+    return sample
+
+
+def _decode(name: str, topic: str, decoder: Decoder, message: bytes) -> Sample:
+    try:
+        return decoder(message)
+    except Exception as error:  # each format's library fails in ways of its own on bytes that are not its messages
+        reason = f"topic {topic!r} holds a message that is no joint state: {str(error) or type(error).__name__}"
+        raise RecordingError(name, reason) from None
 
 
 def _foxglove(message: Any) -> Sample:
@@ -133,7 +149,7 @@ def read_csv(name: str, data: bytes, *, time_column: str, nanoseconds: float) ->
         nanoseconds: that one unit of this column is [ns].
 
     Raises:
-        RecordingError: there is no such column, or a line has another number of cells, or a cell is not a finite number.
+        RecordingError: there is no such column, or a line has another number of cells, or a cell is no finite number.
     """
     try:
         rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -74,11 +74,6 @@ class RecordedJoint(Part):
     unit: Literal["rad", "deg", "mrad", "m", "cm", "mm", "um", "km", "in"] | None = None
     """Unit of the positions in the log; rad or m when left out."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _name_alone(cls, value: Any) -> Any:
-        return {"name": value} if isinstance(value, str) else value
-
 
 class TimeColumn(Part):
     """The times of a CSV file."""
@@ -100,9 +95,9 @@ class Recorded(Part):
     """Column with the times of a .csv file; `time` in seconds when left out."""
     joints: dict[Name, RecordedJoint] = Field(default_factory=dict)
     """The log's joint by joint of the scenario; when left out, the joints that both have under the same name."""
-    start: NotBefore = 0.0
+    start: Time = 0.0
     """Time [s] after the log's first sample at which the scenario begins."""
-    max_gap: Duration = 1.0
+    max_gap: Time = 1.0
     """Longest time [s] between two samples that is bridged in a straight line; a longer one is an error."""
 
 

@@ -116,12 +116,16 @@ def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str,
     factor = 1.0 if source.unit is None else float(dimension.units[source.unit])
     time, position = log[source.name].time, log[source.name].position * factor
     if not np.isfinite(position).all():
-        raise Unusable(path, f"has a position in the log that is no finite number: sample {_first(~np.isfinite(position))}")
-    seconds = (time - time[0]) * 1e-9
+        raise Unusable(
+            path, f"has a position in the log that is no finite number: sample {_first(~np.isfinite(position))}"
+        )
+    seconds = (time - time[0]) / 1e9
     steps = np.diff(time)
     if (steps <= 0).any():
         at = _first(steps <= 0)
-        raise Unusable(path, f"has times in the log that do not increase: after {seconds[at]:.9g} s comes {seconds[at + 1]:.9g} s")
+        raise Unusable(
+            path, f"has times in the log that do not increase: after {seconds[at]:.9g} s comes {seconds[at + 1]:.9g} s"
+        )
     if (steps * 1e-9 > written.max_gap).any():
         at = _first(steps * 1e-9 > written.max_gap)
         rule = f"has a gap of {steps[at] * 1e-9:.6g} s in the log at {seconds[at]:.6g} s; raise max_gap to bridge it"
