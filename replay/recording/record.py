@@ -84,11 +84,11 @@ def record_blocks(
         mcap=Path(directory) / f"{scenario.name}.mcap",
         rrd=Path(directory) / f"{scenario.name}.rrd" if rrd else None,
     )
+    if rrd:  # before any file is made: loading rerun takes a second, in which a run may be interrupted
+        from replay.recording.rerun_log import RerunWriter
     mcap = McapWriter(paths.mcap, provenance, shown, scenario.sources, overwrite=overwrite)
     writers: list[Writer] = [mcap]
     if paths.rrd is not None:
-        from replay.recording.rerun_log import RerunWriter
-
         try:
             writers.insert(0, RerunWriter(paths.rrd, scene.layout, shown, overwrite=overwrite))
         except BaseException:
