@@ -112,13 +112,13 @@ WEIGHTS_16 = np.array(
 
 
 def _symmetric_rule(centre: float, *orbits: tuple[float, ...]) -> NDArray[np.float64]:
-    """Return (k, 4) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
+    """Return (4, k) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
     rows: list[tuple[float, ...]] = [(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, centre)]
     for weight, *place in orbits:
         corners = (*place, *place) if len(place) == 1 else tuple(place)
         point = (*corners, 1.0 - corners[0] - corners[1])
         rows += [(*permuted, weight) for permuted in sorted(set(permutations(point)))]
-    return np.array(rows)
+    return np.ascontiguousarray(np.array(rows).T)
 
 
 TRIANGLE_7 = _symmetric_rule(
