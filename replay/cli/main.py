@@ -17,6 +17,7 @@ COMMANDS = {
     "run": "simulate scenarios and record them",
     "validate": "check scenarios without running them",
     "info": "say what is in a recording",
+    "calibrate": "fit a capacitive sensor to a measured curve",
     "export": "write a recording's topics as csv, json or parquet",
     "view": "show recordings in the rerun viewer, or make a picture",
 }
