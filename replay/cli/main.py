@@ -18,6 +18,7 @@ COMMANDS = {
     "validate": "check scenarios without running them",
     "info": "say what is in a recording",
     "calibrate": "fit a capacitive sensor to a measured curve",
+    "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
     "view": "show recordings in the rerun viewer, or make a picture",
 }
