@@ -14,17 +14,23 @@ FOLDER = click.Path(path_type=Path)
 
 @click.command()
 @click.argument("names", nargs=-1, type=click.Choice(["I", "II", "III", "IV"]), metavar="[I|II|III|IV]...")
-@click.option("-o", "--output", type=FOLDER, default=Path("experiments"), show_default=True, help="Folder for the files.")
 @click.option(
-    "--scenarios", type=FOLDER, default=Path("scenarios/experiments"), show_default=True, help="The experiments' folder."
+    "-o", "--output", type=FOLDER, default=Path("experiments"), show_default=True, help="Folder for the files."
+)
+@click.option(
+    "--scenarios",
+    type=FOLDER,
+    default=Path("scenarios/experiments"),
+    show_default=True,
+    help="The experiments' folder.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 @format_option
 def experiments(names: tuple[str, ...], output: Path, scenarios: Path, overwrite: bool, form: str) -> ExitCode:
     """Reproduce the thesis's experiments (all when none is named), with tables (CSV) and drawings (PNG).
 
-    I: error and time of midpoint splitting. II: fit one plate size. III: predict the other sizes. IV: predict a pivoting
-    plate. The measured sensor of II to IV is a boundary-element solution, see scenarios/experiments/data.
+    I: error and time of midpoint splitting. II: fit one plate size. III: predict the other sizes. IV: predict a
+    pivoting plate. The measured sensor of II to IV is a boundary-element solution, see scenarios/experiments/data.
     """
     from replay.bench.experiments.run import EXPERIMENTS, run, write
 

@@ -23,7 +23,7 @@ _AFTER_UNDERSCORE = re.compile(r"(.+)_([A-Za-z]+)")
 
 @dataclass(frozen=True)
 class Column:
-    """A column's name as the header has it (`distance_cm`, `output [V]`), what it names, and in which unit ("" if none)."""
+    """A column: its header (`distance_cm`, `output [V]`), what that names, and in which unit ("" if none)."""
 
     header: str
     name: str
@@ -84,7 +84,9 @@ def read_curve(
             raise CurveError(str(path), line, f"has no column {name!r}; its columns are {', '.join(names)}")
     x_name, y_name = _axes(path, line, names, x, y, chosen)
 
-    lines, x_values, y_values = [], [], []
+    lines: list[int] = []
+    x_values: list[float] = []
+    y_values: list[float] = []
     for line, row in rows[1:]:
         if len(row) != len(names):
             raise CurveError(str(path), line, f"has {len(row)} values where the header names {len(names)} columns")
@@ -103,9 +105,7 @@ def read_curve(
     if not lines:
         wanted = ", ".join(f"{name} = {value}" for name, value in chosen.items())
         raise CurveError(str(path), None, f"has no row with {wanted}" if chosen else "has no row below its header")
-    return Curve(
-        str(path), _column(x_name), _column(y_name), np.array(x_values), np.array(y_values), tuple(lines)
-    )
+    return Curve(str(path), _column(x_name), _column(y_name), np.array(x_values), np.array(y_values), tuple(lines))
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:

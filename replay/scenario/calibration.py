@@ -1,4 +1,4 @@
-"""A scenario's capacitive sensor and a measured curve: where the model stands at each point, and the sensor's new constants."""
+"""A scenario's capacitive sensor and a measured curve: what the model says at each point, and the fitted sensor."""
 
 from __future__ import annotations
 
@@ -53,7 +53,9 @@ class SensorPath:
         moved = {*scene.script.points, *(name for move in scene.script.moves for name in move.to)}
         self.scenario = scenario
         self.sensor = sensors[_only("sensor", sensor, sorted(sensors), sorted(sensors))]
-        self.joint: Joint = joints[_only("joint", joint, sorted(joints), sorted(moved & joints.keys()) or sorted(joints))]
+        self.joint: Joint = joints[
+            _only("joint", joint, sorted(joints), sorted(moved & joints.keys()) or sorted(joints))
+        ]
         self._linkage = scene.linkage
         self._start = sample(scene.linkage, scene.script, np.zeros(1))
         unit = replace(self.sensor, permittivity=1.0, stray_capacitance=0.0)
@@ -85,7 +87,9 @@ class SensorPath:
         for line, value in zip(curve.lines, values, strict=True):
             if not self.joint.lower <= value <= self.joint.upper:
                 limits = f"{self.joint.lower:.6g} .. {self.joint.upper:.6g} {wanted.si}"
-                raise CurveError(curve.file, line, f"{value:.6g} {wanted.si} is outside joint {self.joint.name!r}: {limits}")
+                raise CurveError(
+                    curve.file, line, f"{value:.6g} {wanted.si} is outside joint {self.joint.name!r}: {limits}"
+                )
         return values
 
     def integral_along(self, curve: Curve) -> Floats:
@@ -93,7 +97,9 @@ class SensorPath:
         found = self.integral(self.positions(curve))
         for line, value in zip(curve.lines, found, strict=True):
             if not np.isfinite(value):
-                raise CurveError(curve.file, line, "the sensor is in contact there and has no finite reading; leave it out")
+                raise CurveError(
+                    curve.file, line, "the sensor is in contact there and has no finite reading; leave it out"
+                )
         return found
 
 
@@ -177,9 +183,7 @@ def sensor_file(fit: CurveFit) -> str:
     for name in ("coupling", "permittivity", "stray_capacitance"):
         written[name] = float(f"{getattr(found, name):.{_DIGITS}g}")
     stream = StringIO()
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[attr-defined]
+    yaml = YAML()
     yaml.width = 110
     yaml.dump({"sensors": {"capacitive": {path.sensor.name: _plain(written)}}}, stream)
     remarks = [
@@ -205,7 +209,9 @@ def in_si(file: str, column: Column, values: Floats, wanted: tuple[Dimension, ..
     what_works = " or ".join(f"{column.name}_{unit}" for dimension in wanted for unit in dimension.units)
     dimension = DIMENSION_OF.get(column.unit)
     if dimension is None:
-        raise CurveError(file, None, f"column {column.header!r} does not end in a unit that is known; call it {what_works}")
+        raise CurveError(
+            file, None, f"column {column.header!r} does not end in a unit that is known; call it {what_works}"
+        )
     if dimension not in wanted:
         needed = " or ".join(entry.name for entry in wanted)
         raise CurveError(file, None, f"column {column.header!r} is {dimension.name} where {needed} belongs")
@@ -252,6 +258,13 @@ def _absolute(path: SensorPath, written: tuple[str, str]) -> tuple[float, float]
 
 
 def _plain(value: Any) -> Any:
+    """Return what the YAML writer knows, lists on one line."""
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, tuple | list) else value
+    if not isinstance(value, tuple | list):
+        return value
+    from ruamel.yaml.comments import CommentedSeq
+
+    sequence = CommentedSeq([_plain(entry) for entry in value])
+    sequence.fa.set_flow_style()
+    return sequence

@@ -121,7 +121,9 @@ def _value(entry: Estimate) -> str:
     if not entry.fitted:
         return f"{number} stated, not fitted"
     interval = _interval(entry)
-    return f"{number} {interval[0]:.4g} .. {interval[1]:.4g}" if interval else f"{number} no interval: no point to spare"
+    return (
+        f"{number} {interval[0]:.4g} .. {interval[1]:.4g}" if interval else f"{number} no interval: no point to spare"
+    )
 
 
 def _is_loose(entry: Estimate) -> bool:

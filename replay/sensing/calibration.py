@@ -1,45 +1,34 @@
 """Fit of a capacitive sensor's constants to a measured curve.
 
-Model: C = eps I + C_0, where I [m] is the sensor's integral of dA/dist over what it senses (its reading with permittivity 1)
+Model: C = eps I + C_0, where I [m] is the sensor's integral of dA/dist over what it senses (its reading at permittivity 1)
 and C_0 its stray capacitance. Two quantities can be measured:
 
     capacitance     y = C                               determines eps and C_0
     delta output    y = V_in C / (C_couple + C)         determines kappa = eps / C_couple and C_0 / C_couple only
 
-All constants of the second can be scaled together without any change of y, so C_couple must be stated, or follow from one
-absolute capacitance C_a measured with the integral at I_a: C_couple = C_a / (kappa I_a + C_0 / C_couple).
+All constants of the second can be scaled together without any change of y, so C_couple must be stated, or follow from
+one absolute capacitance C_a measured where the integral is I_a: C_couple = C_a / (kappa I_a + C_0 / C_couple).
 
-Both are fitted in z = q_0 I/I_max + q_1 (q_1 is held when C_0 is stated), with y = y_max z for a capacitance and y = V_in z / (1 + z) for a delta output.
+Both are fitted in z = q_0 I/I_max + q_1 (q_1 is held when C_0 is stated), with y = y_max z for a capacitance and
+y = V_in z / (1 + z) for a delta output.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import CalibrationError, InvalidValue
+from replay.sensing.robust_fit import robust_fit
 
 Floats = NDArray[np.float64]
 Quantity = Literal["capacitance", "delta_output"]
 
 QUANTITIES: tuple[Quantity, ...] = ("capacitance", "delta_output")
 CONFIDENCE = 0.95
-
-SMALLEST_INDEPENDENCE = 1e-4
-"""Two parameters whose effects on the curve agree to this part of the larger are not told apart: the model's own integrals
-are only good to `rtol` (1e-6 when not stated), and no measurement is better than 0.01 %."""
-
-_EXACT = 1e-9
-"""Residuals below this part of the curve's size are rounding: there is nothing to be robust against."""
-
-_LOWEST = -0.49
-"""Lower bound of both parameters of a delta output, which keeps z away from the pole at -1; results below 0 are refused."""
-
-_MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +85,13 @@ class Calibration:
 
 
 def response(
-    integral: ArrayLike, *, quantity: Quantity, permittivity: float, stray_capacitance: float, coupling: float, supply: float
+    integral: ArrayLike,
+    *,
+    quantity: Quantity,
+    permittivity: float,
+    stray_capacitance: float,
+    coupling: float,
+    supply: float,
 ) -> Floats:
     """Return the capacitance [F] or the delta output [V] of a sensor whose integral is given [m]."""
     capacitance = permittivity * np.asarray(integral, dtype=np.float64) + stray_capacitance
@@ -120,7 +115,7 @@ def calibrate(
         integral: (n,) [m], the sensor's integral at each point, finite and >= 0.
         measured: (n,) [F] or [V].
         quantity: "capacitance" or "delta_output" = V_in - V_out.
-        coupling: C_couple [F]: stated for a delta output (and not used where `absolute` gives it), kept for a capacitance.
+        coupling: C_couple [F]; not used where `absolute` gives it, kept as it is for a capacitance.
         supply: V_in [V].
         stray_capacitance: C_0 [F], held unless `offset` is fitted.
         offset: whether C_0 is fitted.
@@ -134,8 +129,8 @@ def calibrate(
         InvalidValue: an argument is not as stated.
         CalibrationError: the points do not determine the parameters, or determine values that no sensor has.
 
-    Accuracy: constants of a curve without noise come back to 1e-9; intervals of a noisy one hold the truth in 90..99 % of
-    cases (test_calibration).
+    Accuracy: constants of a curve without noise come back to 1e-9; intervals of a noisy one hold the truth in 90 to
+    99 % of cases (test_calibration).
 
     Source: P. J. Huber, Robust Statistics (1981), section 7.6, for the covariance; the model is Huijgens 2015.
     """
@@ -151,7 +146,9 @@ def calibrate(
     if absolute is not None and not divided:
         raise CalibrationError("a capacitance curve does not show the coupling; fit a delta output to find it")
     if absolute is not None and stray_capacitance > 0.0 and not offset:
-        raise CalibrationError("a stated stray capacitance cannot be held while the coupling is fitted; fit the offset too")
+        raise CalibrationError(
+            "a stated stray capacitance cannot be held while the coupling is fitted; fit the offset too"
+        )
     if absolute is not None and not (absolute[0] >= 0.0 and absolute[1] > 0.0 and np.isfinite(absolute).all()):
         raise InvalidValue("absolute", absolute, "must be a finite integral >= 0 m and a finite capacitance > 0 F")
     if divided and not (y < supply).all():
@@ -167,93 +164,36 @@ def calibrate(
 
     design = np.column_stack([I / largest, np.ones_like(I)])[:, : 1 + offset]
     held = 0.0 if offset else stray_capacitance / (coupling if divided else scale)
-    q, covariance = _robust(design, held, y / scale, divided)
+    q, covariance = robust_fit(design, held, y / scale, divided)
     if q[0] <= 0.0:
         raise CalibrationError(
             "the measured curve falls where the model's rises, so the fitted permittivity is not above 0;"
             " check the joint, the direction of the abscissa and the measured column"
         )
     if offset and q[1] < 0.0:
-        raise CalibrationError(
-            f"the fitted offset is negative ({scale * q[1]:.4g} F), which no stray capacitance is; fit without an offset"
-            if not divided
-            else f"the fitted C_0/C_couple is negative ({q[1]:.4g}), which no stray capacitance is; fit without an offset"
-        )
+        what = f"C_0 / C_couple = {q[1]:.4g}" if divided else f"C_0 = {scale * q[1]:.4g} F"
+        raise CalibrationError(f"the fitted offset, {what}, is below 0, which no stray capacitance is; fit without one")
     spread = _t_quantile(len(I) - len(q))
     if divided:
         constants, estimates = _from_delta_output(q, covariance, spread, largest, held, coupling, absolute)
     else:
         constants, estimates = _from_capacitance(q, covariance, spread, largest, scale, held, coupling)
     eps, stray, coupling = constants
-    fitted = response(
-        I, quantity=quantity, permittivity=eps, stray_capacitance=stray, coupling=coupling, supply=supply
-    )
+    fitted = response(I, quantity=quantity, permittivity=eps, stray_capacitance=stray, coupling=coupling, supply=supply)
     return Calibration(quantity, eps, stray, coupling, estimates, y, fitted, len(q))
 
 
 def _points(integral: ArrayLike, measured: ArrayLike) -> tuple[Floats, Floats]:
     I, y = np.array(integral, dtype=np.float64), np.array(measured, dtype=np.float64)
     if I.ndim != 1 or I.shape != y.shape or len(I) == 0:
-        raise InvalidValue("measured", f"array of shape {y.shape}", f"must be (n,) like the integral's {I.shape}, n >= 1")
+        raise InvalidValue(
+            "measured", f"array of shape {y.shape}", f"must be (n,) like the integral's {I.shape}, n >= 1"
+        )
     if not (np.isfinite(I).all() and (I >= 0.0).all()):
         raise InvalidValue("integral", "array", "must be finite and >= 0 m; a saturated point cannot be fitted")
     if not np.isfinite(y).all():
         raise InvalidValue("measured", "array", "must be finite")
     return I, y
-
-
-def _robust(design: Floats, held: float, y: Floats, divided: bool) -> tuple[Floats, Floats]:
-    """Return the parameters q and their covariance, for y = z or y = z / (1 + z) with z = design q + held.
-
-    With residuals r at scale s, psi(r) = r / sqrt(1 + (r/s)^2) is the derivative of soft_l1, and the covariance of an
-    M-estimate is  sum psi^2 / (n - p) / mean(psi')^2 (J^T J)^-1.  The scale is taken from the plain least-squares fit,
-    which is unique: z is linear, and y rises with it.
-    """
-    from scipy.optimize import least_squares
-
-    n, p = design.shape
-
-    def residuals(q: Floats) -> Floats:
-        z = design @ q + held
-        return np.asarray((z / (1.0 + z) if divided else z) - y)
-
-    def jacobian(q: Floats) -> Floats:
-        return np.asarray(design / (1.0 + design @ q + held)[:, None] ** 2 if divided else design)
-
-    lowest = np.full(p, _LOWEST if divided else -np.inf)
-    start = np.linalg.lstsq(design, (y / (1.0 - y) if divided else y) - held, rcond=None)[0]
-    start = np.maximum(start, lowest + 1e-3)
-    _check_independence(jacobian(start))
-    settings: dict[str, Any] = {
-        "bounds": (lowest, np.inf),
-        "xtol": 1e-15,
-        "ftol": 1e-15,
-        "gtol": 1e-15,
-        "x_scale": "jac",
-        "max_nfev": 1000,
-    }
-    q = least_squares(residuals, start, jacobian, **settings).x
-    s = _MAD_TO_SIGMA * float(np.median(np.abs(residuals(q))))
-    psi, slope = residuals(q), 1.0
-    if s > _EXACT and n > p:
-        q = least_squares(residuals, q, jacobian, loss="soft_l1", f_scale=s, **settings).x
-        weight = 1.0 / np.sqrt(1.0 + (residuals(q) / s) ** 2)
-        psi, slope = residuals(q) * weight, float(np.mean(weight**3))
-    if n == p:
-        return q, np.full((p, p), np.nan)
-    J = jacobian(q)
-    return q, np.sum(psi**2) / (n - p) / slope**2 * np.linalg.inv(J.T @ J)
-
-
-def _check_independence(J: Floats) -> None:
-    if J.shape[1] == 1:
-        return
-    singular = np.linalg.svd(J / np.sqrt(np.sum(J**2, axis=0)), compute_uv=False)
-    if singular[-1] < SMALLEST_INDEPENDENCE * singular[0]:
-        raise CalibrationError(
-            "the curve cannot tell the offset from the permittivity: what the model senses is the same at all points;"
-            " measure where it changes, or fit without an offset"
-        )
 
 
 def _t_quantile(dof: int) -> float:
@@ -264,7 +204,7 @@ def _t_quantile(dof: int) -> float:
 
 def _half_widths(covariance: Floats, gradient: Floats, spread: float) -> Floats:
     """Return the half widths of functions of the parameters whose gradients are the rows of `gradient`."""
-    return spread * np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0.0))
+    return np.asarray(spread * np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0.0)))
 
 
 def _from_capacitance(

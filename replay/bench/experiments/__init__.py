@@ -1,1 +1,1 @@
-"""The thesis's experiments I to IV: splitting, fitting a curve, predicting other plates, predicting a pivoting plate."""
+"""The thesis's experiments I to IV: splitting, fitting a curve, predicting other plates and a pivoting one."""

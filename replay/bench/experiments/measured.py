@@ -48,7 +48,7 @@ PIVOT_CENTRES = {20: 11, 10: 6}
 
 @dataclass(frozen=True)
 class Reading:
-    """What is taken as measured: a column of the files, plus a stray capacitance [pF], seen directly or by a divider."""
+    """What is taken as measured: a column of the files plus a stray capacitance [pF], read directly or by a divider."""
 
     name: str
     column: str

@@ -61,6 +61,12 @@ class Prediction:
         return np.asarray(self.predicted / self.curve.y_values - 1.0)
 
     @property
+    def worst_of_range(self) -> float:
+        """Largest error over the range of the measured curve, which a constant offset does not flatter."""
+        error = np.abs(self.predicted - self.curve.y_values)
+        return float(error.max() / np.ptp(self.curve.y_values))
+
+    @property
     def worst(self) -> int:
         """Index of the point with the largest deviation, up or down."""
         return int(np.argmax(np.abs(self.deviation)))
@@ -142,7 +148,7 @@ def run_sizes(folder: Path) -> tuple[list[Table], list[Panel]]:
         for side in SIDES
         if side != FITTED_SIDE
     ]
-    remarks = [line for reading in READINGS for line in _signs(reading, found)]
+    remarks = [_signs(reading, found) for reading in READINGS]
     title = f"III. Other plate sizes, predicted from the fit on {FITTED_SIDE} cm: predicted over measured - 1"
     tables = [
         Table("experiment_3_sizes", title, [_summary(entry) for entry in found], remarks),
@@ -178,6 +184,7 @@ def _summary(entry: Prediction) -> dict[str, Cell]:
         "lowest [%]": float(percent.min()),
         "highest [%]": float(percent.max()),
         "mean [%]": float(percent.mean()),
+        "worst / range [%]": 100.0 * entry.worst_of_range,
     }
 
 
@@ -199,23 +206,23 @@ def _points(entry: Prediction) -> list[dict[str, Cell]]:
     ]
 
 
-def _signs(reading: Reading, predictions: Iterable[Prediction]) -> list[str]:
-    """Return one line: for each size, the worst deviation of the sensors without a back plate, and of the one with."""
+def _signs(reading: Reading, predictions: Iterable[Prediction]) -> str:
+    """Return one line: the worst deviations for each size, of the sensors without a back plate and of the one with."""
     parts = []
+    chosen = [entry for entry in predictions if entry.reading is reading]
     for side in SIDES:
-        worst = [
-            (entry.plate.back != "", 100.0 * float(entry.deviation[entry.worst]))
-            for entry in predictions
-            if entry.reading is reading and entry.side == side
-        ]
-        open_ones, backed = ([value for flag, value in worst if flag is wanted] for wanted in (False, True))
+        worst = [(entry.plate.back, float(entry.deviation[entry.worst])) for entry in chosen if entry.side == side]
         if worst:
-            parts.append(f"{side} cm: {_span(open_ones)} ({_span(backed)} with a grounded back plate)")
-    return [f"{reading.name}: worst point {'; '.join(parts)}."]
+            open_ones = _span([value for back, value in worst if not back])
+            backed = _span([value for back, value in worst if back])
+            parts.append(f"{side} cm plate {open_ones} ({backed} with a grounded back plate)")
+    of_range = [100.0 * entry.worst_of_range for entry in chosen]
+    range_part = f"{min(of_range):.0f} .. {max(of_range):.0f} % of the curve's own range"
+    return f"{reading.name}, worst point: {'; '.join(parts)}; {range_part}."
 
 
 def _span(values: Sequence[float]) -> str:
-    low, high = min(values), max(values)
+    low, high = 100.0 * min(values), 100.0 * max(values)
     return f"{low:+.0f} %" if round(low) == round(high) else f"{low:+.0f} .. {high:+.0f} %"
 
 

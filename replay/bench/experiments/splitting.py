@@ -42,9 +42,9 @@ _ERROR, _TIME = "largest error", "time per frame [us]"
 def run(folder: Path) -> tuple[list[Table], list[Panel]]:
     """Return the table and the drawing of experiment I.
 
-    Midpoint and `exact` see the plate as its two triangles; `tree`, and `exact` again, see the same plate cut into 2048.
-    Errors are relative to `exact` on two, the largest and the mean over the frames of the scenario; times are the best of a
-    few runs over all frames, per frame. Midpoint goes on past 7 splits until its largest error is below 1e-6.
+    Midpoint and `exact` see the plate as its two triangles; `tree`, and `exact` again, see it cut into 2048. Errors are
+    relative to `exact` on two, the largest and the mean over the frames of the scenario; times are the best of a few
+    runs over all frames, per frame. Midpoint goes on past 7 splits until its largest error is below 1e-6.
     """
     scene = build(load(folder / SCENARIO))
     coarse = scene.targets
