@@ -19,6 +19,8 @@ COMMANDS = {
     "run": "simulate scenarios and record them",
     "validate": "check scenarios without running them",
     "info": "say what is in a recording",
+    "calibrate": "fit a capacitive sensor to a measured curve",
+    "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
     "view": "show recordings in the rerun viewer, or make a picture",
