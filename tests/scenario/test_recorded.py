@@ -147,7 +147,11 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
         ("{recorded: {file: robot.mcap, time: {unit: ms}}}", {}, "has no effect with a .mcap"),
         ("{recorded: {file: log.csv, topic: /x}}", {}, "has no effect with a .csv"),
         ("{recorded: {file: cut.mcap}}", {"cut.mcap": log("cdr")[:-40]}, "damaged: its end is missing"),
-        ("{recorded: {file: robot.mcap, joints: {swing: {name: j2}}}}", {}, "is not in the log; its joints are j1, lift"),
+        (
+            "{recorded: {file: robot.mcap, joints: {swing: {name: j2}}}}",
+            {},
+            "is not in the log; its joints are j1, lift",
+        ),
         ("{recorded: {file: robot.mcap, joints: {swing: {name: j1, unit: cm}}}}", {}, "is no unit of joint 'swing'"),
         ("{recorded: {file: robot.mcap, joints: {arm: {name: j1}}}}", {}, "is no joint with a position"),
         ("{recorded: {file: robot.mcap, joints: {swing: {name: j1}}}}", {}, "breaks a limit"),  # degrees taken as rad
