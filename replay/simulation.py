@@ -2,42 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.scenario.layout import Layout
 from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+
+if TYPE_CHECKING:
+    from replay.collision.pipeline import CollisionPipeline
+    from replay.scenario.methods import Model
+    from replay.scenario.model import Scenario
+    from replay.scenario.scene import Scene
+    from replay.sensing.capacitive import CapacitiveSuite
+    from replay.sensing.distance import DistanceSuite
+
+__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "simulate"]
 
 Floats = NDArray[np.float64]
 
 BLOCK_FRAMES = 256
 """Frames per block; recorded, because warm-start state resets at block starts."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The names behind the columns, each listed once and sorted.
-
-    Attributes:
-        links: L link names.
-        joints: J names of scalar joints; `joint_units` their units, "rad" or "m".
-        shapes: names "link/shape" of all shapes, for the distance sensor's `shape` column.
-        pairs: P names "link/shape|link/shape" of the pairs that are tested.
-        distance_sensors: D names.
-        capacitive_sensors: C names.
-        objects: O names of the shapes that capacitive sensors sense.
-    """
-
-    links: tuple[str, ...]
-    joints: tuple[str, ...]
-    joint_units: tuple[str, ...]
-    shapes: tuple[str, ...]
-    pairs: tuple[str, ...]
-    distance_sensors: tuple[str, ...]
-    capacitive_sensors: tuple[str, ...]
-    objects: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,3 +51,113 @@ class FrameBlock:
     collision: CollisionColumns | None
     distance: DistanceColumns | None
     capacitive: CapacitiveColumns | None
+
+
+class Simulation:
+    """A scene with everything that is computed once, ready to answer block after block.
+
+    Args:
+        scene: see `scenario.scene.build`.
+
+    Raises:
+        MissingPackageError: the model names an engine that is not installed.
+        MotionLimitError: the script breaks a limit.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        from replay.kinematics.motion import sample
+
+        self.scene = scene
+        self._states = sample(scene.linkage, scene.script, scene.seconds(0, scene.frames))
+        self.collision = _collision(scene)
+        self.distance = _distance(scene)
+        self.capacitive = _capacitive(scene)
+
+    def block(self, first: int) -> FrameBlock:
+        """Return the block that begins at a frame; it depends on no other block."""
+        last = min(first + BLOCK_FRAMES, self.scene.frames)
+        states = self._states
+        poses = self.scene.linkage.forward(states.positions[first:last], states.free_poses[first:last])
+        return FrameBlock(
+            layout=self.scene.layout,
+            first=first,
+            time=self.scene.time_ns(first, last),
+            joint_positions=states.positions[first:last],
+            joint_velocities=states.velocities[first:last],
+            link_poses=poses.world,
+            collision=self.collision.run(poses) if self.collision else None,
+            distance=self.distance.run(poses) if self.distance else None,
+            capacitive=self.capacitive.run(poses) if self.capacitive else None,
+        )
+
+    def blocks(self) -> Iterator[FrameBlock]:
+        """Yield all blocks in order."""
+        for first in range(0, self.scene.frames, BLOCK_FRAMES):
+            yield self.block(first)
+
+
+def simulate(scenario: Scenario, *, model: Model | None = None) -> Iterator[FrameBlock]:
+    """Yield a scenario's frames in blocks of `BLOCK_FRAMES`, the last one shorter.
+
+    Args:
+        scenario: what `replay.load` returned.
+        model: replaces the scenario's own model, see `replay.scenario.load.load_model`.
+
+    Raises:
+        ScenarioError: a mesh cannot be used, or an expectation is about a pair that is not tested.
+        MotionLimitError: the script breaks a limit.
+        MissingPackageError: the model names an engine that is not installed.
+
+    Accuracy: of the methods that the model names; the same numbers on every run, whatever the block is computed by.
+    """
+    from replay.scenario.scene import build
+
+    yield from Simulation(build(scenario, model=model)).blocks()
+
+
+def _collision(scene: Scene) -> CollisionPipeline | None:
+    if not scene.pairs:
+        return None
+    from replay.collision.pipeline import CollisionPipeline
+
+    version = scene.model.collision
+    return CollisionPipeline(
+        scene.bodies,
+        scene.pairs,
+        scene.linkage,
+        bounds=version.bounds,
+        narrowphase=version.narrowphase,
+        pieces=version.pieces,
+        clearance=version.clearance,
+        margin=scene.margin,
+    )
+
+
+def _distance(scene: Scene) -> DistanceSuite | None:
+    if not scene.distance_sensors:
+        return None
+    from replay.sensing.distance import DistanceSuite
+
+    model = scene.model
+    return DistanceSuite(
+        scene.distance_sensors,
+        scene.targets,
+        method=model.distance.method,
+        count=model.ray_count,
+        engine=model.ray_engine,
+    )
+
+
+def _capacitive(scene: Scene) -> CapacitiveSuite | None:
+    if not scene.capacitive_sensors:
+        return None
+    from replay.sensing.capacitive import CapacitiveSuite
+
+    model = scene.model
+    return CapacitiveSuite(
+        scene.capacitive_sensors,
+        scene.targets,
+        method=model.capacitive.method,
+        rtol=model.rtol,
+        splits=model.splits,
+    )

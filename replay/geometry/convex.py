@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.tree import Tree
+from replay.errors import InvalidValue
+from replay.geometry.hull import convex_hull
+from replay.geometry.solid import Solid
+from replay.geometry.tree import Tree, build_tree
+
+BRUTE_FORCE_VERTICES = 64
+"""Sets with more vertices than this carry their adjacency; below, looking at every vertex is as fast as climbing."""
+
+Array = NDArray[np.float64]
 
 
 class ConvexSets(NamedTuple):
@@ -25,3 +34,88 @@ class ConvexSets(NamedTuple):
     neighbors: NDArray[np.int64]  # (e,)
     tree: Tree  # over the sets' boxes
     surface: bool
+
+
+def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "exact") -> ConvexSets:
+    """Return the convex sets that stand for a solid in collisions.
+
+    Args:
+        solid: the body.
+        pieces: "exact": the solid's own convex pieces, or one set a triangle when it has none; "convex": its own
+            pieces, or an approximate convex decomposition when it has none (see `decomposition.decompose`); "hull":
+            the convex hull of the whole.
+
+    Raises:
+        InvalidValue: another value of `pieces`, or no triangles.
+    """
+    if pieces not in ("exact", "convex", "hull"):
+        raise InvalidValue("pieces", pieces, "must be one of exact, convex, hull")
+    if len(solid.triangles) == 0:
+        raise InvalidValue("solid.triangles", solid.triangles.shape, "a body needs at least one triangle")
+    if pieces == "hull":
+        return from_pieces([solid.vertices])
+    if solid.pieces:
+        return from_pieces(solid.pieces)
+    if pieces == "exact":
+        return _from_triangles(solid)
+    from replay.geometry.decomposition import decompose
+
+    return from_pieces(decompose(solid).pieces)
+
+
+def from_pieces(pieces: Sequence[Array]) -> ConvexSets:
+    """Return the sets of convex pieces given by vertices (k, 3) [m]; vertices inside a piece's hull are left out."""
+    vertices, neighbors, degrees = [], [], []
+    for piece in pieces:
+        reduced, adjacent = _extreme_vertices(np.unique(np.asarray(piece, dtype=np.float64) + 0.0, axis=0))
+        vertices.append(reduced)
+        neighbors += adjacent
+        degrees += [len(k) for k in adjacent]
+    first = _running_total([len(k) for k in vertices])
+    lower = np.array([k.min(axis=0) for k in vertices])
+    upper = np.array([k.max(axis=0) for k in vertices])
+    return ConvexSets(
+        vertices=np.concatenate(vertices),
+        first=first,
+        neighbors_first=_running_total(degrees),
+        neighbors=np.array([k for adjacent in neighbors for k in adjacent], dtype=np.int64),
+        tree=build_tree(lower, upper, leaf_size=1),
+        surface=False,
+    )
+
+
+def _from_triangles(solid: Solid) -> ConvexSets:
+    triangles = np.ascontiguousarray(solid.triangles)
+    return ConvexSets(
+        vertices=triangles.reshape(-1, 3),
+        first=np.arange(0, 3 * len(triangles) + 1, 3, dtype=np.int64),
+        neighbors_first=np.zeros(3 * len(triangles) + 1, dtype=np.int64),
+        neighbors=np.zeros(0, dtype=np.int64),
+        tree=build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=1),
+        surface=solid.watertight,
+    )
+
+
+def _extreme_vertices(points: Array) -> tuple[Array, list[list[int]]]:
+    """Return the vertices of the points' hull and, for many of them, each one's neighbours on the hull.
+
+    A linear function that is not largest at a vertex of a polytope is larger at one of the vertex's neighbours, so
+    climbing along edges ends at the support point. Hull faces are triangulated, which only adds edges.
+    """
+    hull = convex_hull(points)
+    if hull is None:  # flat: every point is kept
+        return points, [[] for _ in points]
+    count = len(hull.vertices)
+    adjacent: list[set[int]] = [set() for _ in range(count)]
+    if count > BRUTE_FORCE_VERTICES:
+        place = np.zeros(len(points), dtype=np.int64)
+        place[hull.vertices] = np.arange(count)
+        for a, b, c in place[hull.faces].tolist():
+            adjacent[a] |= {b, c}
+            adjacent[b] |= {a, c}
+            adjacent[c] |= {a, b}
+    return points[hull.vertices], [sorted(k) for k in adjacent]
+
+
+def _running_total(counts: Sequence[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)

@@ -83,8 +83,9 @@ class Profile:
         for start, end, coefficients in zip(self.start, self.end, self.coefficients, strict=True):
             polynomial = np.polynomial.Polynomial(coefficients).deriv(derivative)
             length = float(end - start)
-            inner = [r.real for r in polynomial.deriv().trim().roots() if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
-            times = [0.0, length, *(float(t) for t in inner if 0.0 < t < length)]
+            roots = map(complex, polynomial.deriv().trim().roots())
+            inner = [root.real for root in roots if abs(root.imag) <= 1e-9 * (1.0 + abs(root.real))]
+            times = [0.0, length, *(t for t in inner if 0.0 < t < length)]
             found.extend((float(start) + tau, float(polynomial(tau))) for tau in times)
         return found
 

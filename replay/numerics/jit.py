@@ -17,11 +17,12 @@ import tempfile
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite
 import llvmlite.binding
 import numba
+from numba.core import config
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -97,9 +98,10 @@ def kernel(function: Function) -> Function:
     fast-math and no contraction (every operation rounds as IEEE 754 says), and division by zero gives inf or NaN as in
     NumPy: kernels decide by comparison before they divide.
     """
-    directory = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
+    settings: Any = config  # numba fills this module at run time
+    previous = settings.CACHE_DIR
+    settings.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+        return cast(Function, numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = directory
+        settings.CACHE_DIR = previous

@@ -162,5 +162,6 @@ def slerp(start: Array, end: Array, fraction: Array) -> Array:
     safe = np.where(straight, 1.0, whole)
     a = np.where(straight, 1.0 - fraction, sine((1.0 - fraction) * angle) / safe)
     b = np.where(straight, fraction, sine(fraction * angle) / safe)
-    q = a[..., None] * start + b[..., None] * end
-    return q / np.sqrt(np.sum(q**2, axis=-1))[..., None]
+    q: Array = a[..., None] * start + b[..., None] * end
+    unit: Array = q / np.sqrt(np.sum(q**2, axis=-1))[..., None]
+    return unit

@@ -1,0 +1,45 @@
+"""`replay export`: write a recording's topics as tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from replay.cli.exit_codes import ExitCode
+from replay.cli.options import note
+
+if TYPE_CHECKING:
+    from replay.recording.export import Format
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option(
+    "--format", "form", type=click.Choice(["csv", "json", "parquet"]), required=True, help="Form of the files."
+)
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder for the files; the recording's own when left out."
+)
+@click.option("--topic", "topics", multiple=True, metavar="GLOB", help="Only topics that match; repeatable.")
+@click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+def export(recording: Path, form: Format, output: Path | None, topics: tuple[str, ...], overwrite: bool) -> ExitCode:
+    """Write topics of RECORDING (.mcap, or what a crash left as .mcap.part) as csv, json or parquet."""
+    from replay.recording.export import export as write
+    from replay.recording.reader import read
+
+    found = read(recording, salvage=recording.suffix == ".part")
+    files = write(
+        found,
+        output or recording.parent,
+        format=form,
+        topics=topics or ("*",),
+        overwrite=overwrite,
+    )
+    for file in files:
+        click.echo(str(file))
+    if found.loss is None:
+        return ExitCode.FINE
+    note(f"{recording}: salvaged: {found.loss.reason}; {found.lost_frames} frames are lost")
+    return ExitCode.LOSSES

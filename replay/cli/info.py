@@ -1,0 +1,30 @@
+"""`replay info`: say what is in a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from replay.cli.exit_codes import ExitCode
+from replay.cli.options import format_option, note, say
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@format_option
+def info(recording: Path, form: str) -> ExitCode:
+    """Say what RECORDING (.mcap, or what a crash left as .mcap.part) holds: topics, counts, provenance.
+
+    Every checksum of the file is verified on the way.
+    """
+    from replay.recording.summary import summarize
+
+    found = summarize(recording, salvage=recording.suffix == ".part")
+    say(form, found.as_text, found.as_json)
+    if found.loss is None:
+        return ExitCode.FINE
+    note(
+        f"{recording}: salvaged: {found.loss.reason}; {found.loss.bytes} bytes and {found.lost_frames} frames are lost"
+    )
+    return ExitCode.LOSSES

@@ -1,0 +1,76 @@
+"""The `replay` command: loads a command's module only when it is called, and turns errors into one line."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+import replay
+from replay.cli.exit_codes import ExitCode
+from replay.errors import ReplayError
+
+COMMANDS = {
+    "run": "simulate scenarios and record them",
+    "validate": "check scenarios without running them",
+    "info": "say what is in a recording",
+    "export": "write a recording's topics as csv, json or parquet",
+    "view": "show recordings in the rerun viewer, or make a picture",
+}
+"""Help by name of command; each is the function of that name in the module of that name."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are used: `--help` needs none of them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names, in the order in which people meet them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """Return a command, importing its module."""
+        if name not in COMMANDS:
+            return None
+        command: click.Command = getattr(importlib.import_module(f"replay.cli.{name}"), name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands from the table, so that no module is imported for it."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(replay.__version__, prog_name="replay")
+def replay_command() -> None:
+    """Simulate scenarios of mechanical systems, record collisions and sensor readings, and compare recordings."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    sys.exit(int(run(arguments)))
+
+
+def run(arguments: Sequence[str] | None = None) -> ExitCode:
+    """Run the command line and return its exit code; errors are said on stderr, one line each."""
+    try:
+        result: Any = replay_command.main(args=arguments, prog_name="replay", standalone_mode=False)
+    except click.exceptions.Exit as left:
+        return ExitCode(left.exit_code)
+    except click.ClickException as error:
+        error.show()
+        return ExitCode.INVALID
+    except ReplayError as error:
+        for line in str(error).splitlines():
+            click.echo(f"replay: error: {line}", err=True)
+        return ExitCode.INVALID
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("replay: interrupted", err=True)
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()  # nobody reads on; Python would complain about it at exit
+        return ExitCode.FINE
+    return result if isinstance(result, ExitCode) else ExitCode.FINE

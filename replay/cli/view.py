@@ -1,0 +1,32 @@
+"""`replay view`: show recordings in the rerun viewer, or make a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from replay.cli.exit_codes import ExitCode
+
+
+@click.command()
+@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--screenshot", type=click.Path(path_type=Path), metavar="PNG", help="Write a picture; needs no display.")
+@click.option("--at", type=float, metavar="SECONDS", help="Moment of the picture; the end when left out.")
+@click.option("--web", is_flag=True, help="Serve the viewer to this machine's browsers, on 127.0.0.1 only.")
+def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None, web: bool) -> ExitCode:
+    """Show RECORDINGS (.rrd, or .mcap with its .rrd beside it) side by side in one viewer."""
+    from replay.recording.picture import picture
+    from replay.recording.viewer import rerun_files, show
+
+    if at is not None and screenshot is None:
+        raise click.UsageError("--at belongs to --screenshot")
+    files = rerun_files(recordings)
+    if screenshot is None:
+        show(files, web=web)
+        return ExitCode.FINE
+    if web or len(files) > 1:
+        raise click.UsageError("--screenshot takes one recording, and not --web")
+    picture(files[0], screenshot, at=at)
+    click.echo(str(screenshot))
+    return ExitCode.FINE

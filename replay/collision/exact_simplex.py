@@ -1,0 +1,128 @@
+"""The point nearest to the origin on a simplex of 1..4 points, in double-doubles, degenerate or not.
+
+Every feature (corner, edge, face, interior) whose affine hull has the foot of the origin's perpendicular strictly
+inside it proposes that foot; each proposal is a point of the simplex, and the nearest point is one of them, so the
+smallest wins. A feature that is degenerate beyond the arithmetic proposes nothing: its lower features stand in for it.
+When a support point w was just added because it is lower along v than v itself, the nearest point's feature has w as a
+corner; asking for that settles ties that even double-doubles cannot see (a direction that is off by x makes the
+distance wrong by x^2 only).
+
+With edge e = q - p: weights (q.e, -p.e) over e.e. Faces and interior as in `simplex`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision import double_double as dd
+from replay.numerics.jit import kernel
+
+Floats = NDArray[np.float64]
+
+DEGENERATE = 2.0**-66
+"""A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
+
+
+@kernel
+def corner(points: Floats, i: int) -> dd.Vector:
+    """Return point i of points (4, 3, 2) as a vector of double-doubles."""
+    return (
+        (points[i, 0, 0], points[i, 0, 1]),
+        (points[i, 1, 0], points[i, 1, 1]),
+        (points[i, 2, 0], points[i, 2, 1]),
+    )
+
+
+@kernel
+def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
+    """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
+
+    Args:
+        points: (4, 3, 2) corners, high and low parts.
+        n: number of corners.
+        newest: the corner that the nearest point's feature must have; -1 for any.
+        size: bound on the corners' distance from the origin.
+        weights: (4,) barycentric coordinates of the nearest point, out.
+    """
+    zero = (0.0, 0.0)
+    best_point = (zero, zero, zero)
+    if n == 4 and _contains_origin(points, size, weights):
+        return True, best_point, zero
+    best = (np.inf, 0.0)
+    weights[:] = 0.0
+    for i in range(n):
+        p = corner(points, i)
+        square = dd.dot(p, p)
+        if newest in (-1, i) and dd.is_less(square, best):
+            best = square
+            best_point = p
+            weights[:] = 0.0
+            weights[i] = 1.0
+    for i in range(n):
+        for j in range(i + 1, n):
+            if newest not in (-1, i, j):
+                continue
+            p, q = corner(points, i), corner(points, j)
+            e = dd.difference(q, p)
+            total = dd.dot(e, e)
+            of_p, of_q = dd.dot(q, e), dd.negative(dd.dot(p, e))
+            if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(total)):
+                continue
+            # from the nearer end, so that the sum does not cancel more than it must
+            t = dd.divide(of_q, total)
+            foot = _sum(p, dd.scale(t, e))
+            if of_q[0] > of_p[0]:
+                foot = dd.difference(q, dd.scale(dd.divide(of_p, total), e))
+            square = dd.dot(foot, foot)
+            if dd.is_less(square, best):
+                best = square
+                best_point = foot
+                weights[:] = 0.0
+                weights[i], weights[j] = of_p[0] / total[0], of_q[0] / total[0]
+    for skipped in range(4):
+        i = 0 if skipped > 0 else 1
+        j = 1 if skipped > 1 else 2
+        k = 2 if skipped > 2 else 3
+        if k >= n or newest not in (-1, i, j, k):
+            continue
+        p, q, r = corner(points, i), corner(points, j), corner(points, k)
+        u, v = dd.difference(q, p), dd.difference(r, p)
+        normal = dd.cross(u, v)
+        total = dd.dot(normal, normal)
+        if not total[0] > DEGENERATE**2 * dd.dot(u, u)[0] * dd.dot(v, v)[0]:
+            continue
+        of_p, of_q, of_r = (
+            dd.dot(normal, dd.cross(q, r)),
+            dd.dot(normal, dd.cross(r, p)),
+            dd.dot(normal, dd.cross(p, q)),
+        )
+        if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(of_r)):
+            continue
+        foot = dd.scale(dd.divide(dd.dot(normal, p), total), normal)
+        square = dd.dot(foot, foot)
+        if dd.is_less(square, best):
+            best = square
+            best_point = foot
+            weights[:] = 0.0
+            weights[i], weights[j], weights[k] = of_p[0] / total[0], of_q[0] / total[0], of_r[0] / total[0]
+    return False, best_point, best
+
+
+@kernel
+def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
+    """Return whether the origin is inside the tetrahedron beyond the rounding error of 2^-100; if so, its weights."""
+    p, q, r, s = corner(points, 0), corner(points, 1), corner(points, 2), corner(points, 3)
+    pq, rs = dd.cross(p, q), dd.cross(r, s)
+    a, b = dd.dot(q, rs), dd.negative(dd.dot(p, rs))
+    c, d = dd.dot(s, pq), dd.negative(dd.dot(r, pq))
+    volume = a[0] + b[0] + c[0] + d[0]
+    sign = -1.0 if volume < 0.0 else 1.0
+    limit = 2.0**-96 * size * size * size
+    weights[0], weights[1], weights[2], weights[3] = a[0] / volume, b[0] / volume, c[0] / volume, d[0] / volume
+    return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit
+
+
+@kernel
+def _sum(u: dd.Vector, v: dd.Vector) -> dd.Vector:
+    return dd.add(u[0], v[0]), dd.add(u[1], v[1]), dd.add(u[2], v[2])

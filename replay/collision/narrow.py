@@ -1,0 +1,85 @@
+"""The narrow phase of a block: level and clearance of the pairs and frames that the broad phase left."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision import traversal
+from replay.collision.bodies import Bodies
+from replay.collision.broad import REPEAT, RUN
+from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, Workspace
+from replay.collision.traversal import STACK, closest, contains_part
+from replay.numerics.jit import kernel
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
+
+COUNTS = traversal.COUNTS + 4
+RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
+"""Rows of the counters after those of `traversal`: pair-frames looked at, contacts found by containment alone, contacts,
+and pair-frames that stayed undecided."""
+
+
+@kernel
+def decide(
+    bodies: Bodies,
+    pairs: Integers,
+    poses: Floats,
+    limit: float,
+    task: Bytes,
+    level: Bytes,
+    clearance: Floats,
+    undecided: Flags,
+    counts: Integers,
+) -> None:
+    """Finish level, clearance and undecided, all (n, P), where task asks for it.
+
+    Args:
+        bodies: of the scene.
+        pairs, poses, task: as `broad.sieve`.
+        limit: clearances above it are left NaN [m]; 0 leaves all of them NaN.
+        level: in and out; 2 is contact.
+        clearance: in NaN, out [m].
+        undecided: in False, out.
+        counts: (COUNTS,) added to.
+    """
+    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16))
+    nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
+    rotation, translation = np.empty((3, 3)), np.empty(3)
+    for p in range(len(pairs)):
+        a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
+        seed[0, 0], seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
+        for f in range(task.shape[0]):
+            if task[f, p] == REPEAT:
+                level[f, p], clearance[f, p], undecided[f, p] = (
+                    level[f - 1, p],
+                    clearance[f - 1, p],
+                    undecided[f - 1, p],
+                )
+            if task[f, p] != RUN:
+                continue
+            for i in range(3):
+                translation[i] = poses[q, f, i, 3]
+                for j in range(3):
+                    rotation[i, j] = poses[q, f, i, j]
+            counts[RUNS] += 1
+            status, distance = closest(
+                bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts[: traversal.COUNTS]
+            )
+            if status == SEPARATED and level[f, p] > 0:
+                held = bodies.surface[a] and contains_part(bodies, a, b, rotation, translation, False)
+                held = held or (bodies.surface[b] and contains_part(bodies, b, a, rotation, translation, True))
+                if held:
+                    status, distance = CONTACT, 0.0
+                    counts[SEEN_INSIDE] += 1
+            if status != SEPARATED:
+                level[f, p] = 2
+                counts[CONTACTS] += 1
+            if status == UNDECIDED:
+                undecided[f, p] = True
+                counts[UNDECIDEDS] += 1
+            if limit > 0.0 and distance <= limit:
+                clearance[f, p] = distance

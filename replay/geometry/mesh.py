@@ -1,0 +1,194 @@
+"""Mesh files as solids: read by trimesh, checked here, with every repair and shortcoming told in the solid's notes."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue, MeshError
+from replay.geometry.hull import convex_hull, to_unit_box
+from replay.geometry.solid import Solid, signed_volume
+from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
+from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
+from replay.numerics.jit import kernel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FORMATS = (".stl", ".obj", ".ply", ".glb")
+"""File endings that can be read; upper case too."""
+
+_LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
+
+_FILE_ROUNDING = 2.0**-22
+"""Bodies are convex when no corner is further outside a face than this times the largest coordinate.
+
+STL and GLB keep 24 bits of a coordinate, so the corners of a convex shape leave their true place by 2^-25 of it each;
+three corners of a face and the one tested add up to less than this for all but slivers, which count as concave.
+"""
+
+
+def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> Solid:
+    """Return the body in a mesh file, its coordinates multiplied by scale.
+
+    Args:
+        path: an STL, OBJ, PLY or GLB file; a GLB's scene is flattened into one body, each part in its place.
+        scale: metres per unit of the file: 0.01 for centimetres.
+        data: the file's content when it has been read already; then the path names the format, and errors.
+
+    Returns:
+        A solid; `notes` tells what a reader should know (not watertight, inside out, dropped triangles). It has one
+        piece if it is convex within the rounding of single-precision coordinates, else none.
+
+    Raises:
+        MeshError: unreadable or of another format, empty, not finite, without any triangle that has an area.
+        InvalidValue: a scale that is not finite and positive.
+    """
+    if not 0.0 < scale < math.inf:
+        raise InvalidValue("scale", scale, "must be finite and positive [m per unit of the file]")
+    name = str(path)
+    vertices, faces = _read(Path(path), name, data)
+    if len(faces) == 0:
+        raise MeshError(name, "holds no triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(name, f"a triangle refers to vertex {faces.max()} of {len(vertices)}")
+    bad = np.count_nonzero(~np.isfinite(vertices[faces]).all(axis=(1, 2)))
+    if bad:
+        raise MeshError(name, f"{bad} of {len(faces)} triangles have a corner that is not finite")
+    with np.errstate(over="ignore", under="ignore"):
+        triangles = vertices[faces] * scale
+    if np.max(np.abs(triangles)) > _LARGEST:
+        raise MeshError(name, f"coordinates times scale = {scale} reach beyond {_LARGEST} m")
+    try:
+        return solid_from_triangles(triangles)
+    except InvalidValue as error:
+        raise MeshError(name, error.rule) from error
+
+
+def solid_from_triangles(triangles: Array) -> Solid:
+    """Return checked triangles (n, 3, 3) [m] as a solid; see `load_mesh` for what is checked and noted.
+
+    Raises:
+        InvalidValue: not finite, or no triangle has an area.
+    """
+    triangles = np.ascontiguousarray(triangles, dtype=np.float64) + 0.0
+    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3) or not np.isfinite(triangles).all():
+        raise InvalidValue("triangles", triangles.shape, "must have shape (n, 3, 3) and be finite")
+    flat = ~_have_area(triangles)
+    dropped = int(np.count_nonzero(flat))
+    if dropped == len(triangles):
+        raise InvalidValue("triangles", len(triangles), f"none of its {dropped} triangles has an area")
+    notes = []
+    if dropped:
+        notes.append(f"{dropped} of {len(triangles)} triangles have no area and were dropped")
+    # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
+    faces = corner_indices(triangles)
+    joints = topology(faces)
+    if joints.open_edges == 0 and joints.reversed_edges:
+        turned = wound_against_neighbours(faces)
+        faces[turned] = faces[turned][:, [0, 2, 1]]
+        if topology(faces).is_closed:
+            joints = topology(faces)
+            triangles[turned] = triangles[turned][:, [0, 2, 1]]
+            notes.append(f"{np.count_nonzero(turned)} triangles were wound against their neighbours and turned over")
+    triangles = np.ascontiguousarray(triangles[~flat])
+    if joints.open_edges:
+        notes.append(f"not watertight: {joints.open_edges} edges are open; it has no inside, only a surface")
+    elif joints.reversed_edges:
+        notes.append(
+            f"not watertight: neighbouring triangles are wound against each other along {joints.reversed_edges} edges"
+        )
+    watertight = joints.is_closed
+    if watertight and signed_volume(triangles) < 0.0:
+        triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
+        notes.append("inside out (its volume is negative): the triangles were turned over")
+    pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
+    return Solid(triangles, pieces=pieces, watertight=watertight, dropped=dropped, notes=tuple(notes))
+
+
+def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
+    """Return the file's vertices (v, 3) and faces (f, 3) as it holds them, scene transforms applied."""
+    ending = path.suffix.lower()
+    if ending not in FORMATS:
+        raise MeshError(name, f"the file ending {path.suffix!r} is not one of {', '.join(FORMATS)}")
+    if data is None:
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise MeshError(name, error.strerror or "cannot be read") from error
+    import trimesh
+
+    try:
+        with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks that follow
+            warnings.simplefilter("ignore")
+            options: dict[str, Any] = {"skip_materials": True} if ending == ".obj" else {}
+            scene = trimesh.load_scene(io.BytesIO(data), file_type=ending[1:], process=False, **options)
+            mesh = scene.to_mesh()
+            vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    except Exception as error:  # a foreign parser on a foreign file may raise anything
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise MeshError(name, f"is not a readable {ending[1:].upper()} file: {reason[:200]}") from error
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _have_area(triangles: Array) -> NDArray[np.bool_]:
+    """Return which triangles (n,) are higher than the rounding of their own corners over their longest edge."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    edges = np.stack([b - a, c - b, a - c])
+    longest = np.max(np.abs(edges), axis=(0, 2))
+    safe = np.where(longest > 0.0, longest, 1.0)[:, None]
+    cross = np.cross(edges[0] / safe, edges[2] / safe)
+    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * np.finfo(np.float64).eps))
+
+
+def _convex_corners(triangles: Array) -> Array:
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    hull = convex_hull(points)
+    return points if hull is None else points[hull.vertices]
+
+
+def _is_convex(triangles: Array) -> bool:
+    """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane."""
+    local, _, scale = to_unit_box(triangles.reshape(-1, 3))
+    slack = _FILE_ROUNDING * float(np.max(np.abs(triangles))) / scale
+    corners = _convex_corners(local.reshape(-1, 3, 3))
+    return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
+
+
+@kernel
+def _all_below(triangles: Array, points: Array, tree: Tree, slack: float) -> bool:
+    """Return whether no point is further than slack outside the plane of any triangle (all of some area).
+
+    Of a box of points, no point is further out than the corner that is furthest along the normal.
+    """
+    waiting = np.empty(MAX_DEPTH, np.int64)
+    for t in range(len(triangles)):
+        ax, ay, az = triangles[t, 0, 0], triangles[t, 0, 1], triangles[t, 0, 2]
+        ux, uy, uz = triangles[t, 1, 0] - ax, triangles[t, 1, 1] - ay, triangles[t, 1, 2] - az
+        vx, vy, vz = triangles[t, 2, 0] - ax, triangles[t, 2, 1] - ay, triangles[t, 2, 2] - az
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        limit = slack * np.sqrt(nx * nx + ny * ny + nz * nz)
+        waiting[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            node = waiting[size]
+            low, high = tree.lower[node], tree.upper[node]
+            x, y, z = high[0] if nx > 0.0 else low[0], high[1] if ny > 0.0 else low[1], high[2] if nz > 0.0 else low[2]
+            if nx * (x - ax) + ny * (y - ay) + nz * (z - az) <= limit:
+                continue
+            if tree.second[node] >= 0:
+                waiting[size], waiting[size + 1] = tree.second[node], node + 1
+                size += 2
+                continue
+            for k in range(tree.begin[node], tree.end[node]):
+                p = points[tree.order[k]]
+                if nx * (p[0] - ax) + ny * (p[1] - ay) + nz * (p[2] - az) > limit:
+                    return False
+    return True

@@ -1,0 +1,64 @@
+"""A shape as its surface triangles and, where it has them, the convex pieces it is the union of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics import transforms
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A polyhedron in its own frame, or, once `transformed`, in its link's frame.
+
+    Attributes:
+        triangles: (n, 3, 3) corners [m], counter-clockwise seen from outside.
+        pieces: vertex sets (k, 3) [m] whose convex hulls' union is the solid: one for a convex shape; () for a concave
+            one that is to be collided by its triangles.
+        watertight: whether the triangles close a volume.
+        chord_error: largest distance [m] of the triangles from the curved surface they stand for; 0 for flat faces.
+        dropped: degenerate triangles dropped on import.
+        notes: what a reader of the scenario should know about an imported mesh, one sentence each.
+    """
+
+    triangles: Array
+    pieces: tuple[Array, ...] = ()
+    watertight: bool = True
+    chord_error: float = 0.0
+    dropped: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether one convex set is the whole solid."""
+        return len(self.pieces) == 1
+
+    @property
+    def vertices(self) -> Array:
+        """The distinct corners (v, 3) [m], sorted by coordinates."""
+        return np.unique(self.triangles.reshape(-1, 3) + 0.0, axis=0)  # + 0.0 makes -0.0 and 0.0 one
+
+    @property
+    def volume(self) -> float:
+        """The enclosed volume [m^3], meaningful when watertight; see `signed_volume`."""
+        return signed_volume(self.triangles)
+
+    def transformed(self, T: Array) -> Solid:
+        """Return the solid moved by the rigid transform T (4, 4)."""
+        T = np.asarray(T, dtype=np.float64)
+        pieces = tuple(transforms.apply(T, piece) for piece in self.pieces)
+        return replace(self, triangles=transforms.apply(T, self.triangles), pieces=pieces)
+
+
+def signed_volume(triangles: Array) -> float:
+    """Return the volume [m^3] that closed triangles (n, 3, 3) [m] enclose, negative when they are inside out.
+
+    The sum of the tetrahedra under the triangles, from a corner of their own: a far origin would cancel digits.
+    """
+    a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)
+    return float(np.sum(a * np.cross(b, c)) / 6.0)

@@ -1,0 +1,168 @@
+"""Topics of a log as columns: strided where all messages have one shape, else message by message."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
+
+from replay.errors import RecordingError
+from replay.logs.mcap_chunks import Run
+from replay.logs.mcap_reader import McapLog
+from replay.logs.protobuf import message_type
+from replay.logs.wire import MessageShape, shape_of
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """All messages of one topic.
+
+    Attributes:
+        name: the topic.
+        schema: name of the message type.
+        time: (n,) log times [ns].
+        columns: by field path, such as "joints[2].position": (n,) or (n, count) values.
+        texts: texts and byte strings by field path, when they are the same in every message.
+        messages: the decoded messages when they have no common shape (then `columns` is empty), else None.
+    """
+
+    name: str
+    schema: str
+    time: NDArray[np.int64]
+    columns: Mapping[str, NDArray[Any]]
+    texts: Mapping[str, str | bytes]
+    messages: tuple[Message, ...] | None
+
+
+def read_topics(
+    log: McapLog, topics: Collection[str] | None = None, *, as_messages: Collection[str] = ()
+) -> dict[str, Topic]:
+    """Return topics of a log (all when None) in one pass over its chunks; those in `as_messages` message by message.
+
+    Raises:
+        RecordingError: damage, a topic that is not protobuf, a message that its schema does not describe, or a
+            number of messages other than the statistics say.
+    """
+    wanted = {
+        channel.id: _Reader(log, channel.id)
+        for channel in sorted(log.channels.values(), key=lambda channel: channel.topic)
+        if topics is None or channel.topic in topics
+    }
+    for reader in wanted.values():
+        if reader.name in as_messages:
+            reader.restart()
+    _pass(log, wanted)
+    irregular = {channel: reader for channel, reader in wanted.items() if not reader.regular}
+    for reader in irregular.values():
+        reader.restart()
+    _pass(log, irregular)
+    result: dict[str, Topic] = {}
+    for reader in wanted.values():
+        topic = reader.topic()
+        if topic.name in result:
+            raise RecordingError(str(log.path), f"topic {topic.name!r} is spread over several channels")
+        result[topic.name] = topic
+    return result
+
+
+def _pass(log: McapLog, wanted: Mapping[int, _Reader]) -> None:
+    for chunk in log.chunks if wanted else ():
+        for run in log.runs(chunk):
+            if run.channel in wanted:
+                wanted[run.channel].add(run)
+
+
+class _Reader:
+    """Collects the runs of one channel: as columns, until one does not fit; then everything again as messages."""
+
+    def __init__(self, log: McapLog, channel: int) -> None:
+        self.regular = True
+        self._log = log
+        self._channel = log.channels[channel]
+        self.name = self._channel.topic
+        self._file = str(log.path)
+        schema = log.schemas.get(self._channel.schema_id)
+        if self._channel.encoding != "protobuf" or schema is None or schema.encoding != "protobuf":
+            raise RecordingError(self._file, f"topic {self.name!r} is not protobuf with a schema")
+        self._schema = schema
+        self._type = message_type(self._file, schema.name, schema.data)
+        self.restart()
+        self._decoding = False
+
+    def restart(self) -> None:
+        """Forget what was read, and decode message by message from now on."""
+        self._times: list[NDArray[np.int64]] = []
+        self._shape: MessageShape | None = None
+        self._columns: dict[str, list[NDArray[Any]]] = {}
+        self._messages: list[Message] = []
+        self._decoding = True
+
+    def add(self, run: Run) -> None:
+        """Take the next run."""
+        if self._decoding:
+            self._times.append(run.time)
+            self._messages.extend(self._decode(data) for data in run.messages())
+        elif self.regular:
+            self._times.append(run.time)
+            self.regular = self._add_rows(run)
+
+    def topic(self) -> Topic:
+        """Return what was read; RecordingError when the statistics count another number of messages."""
+        count = sum(len(time) for time in self._times)
+        expected = self._log.message_counts
+        if expected is not None and self._log.loss is None and expected.get(self._channel.id, 0) != count:
+            raise RecordingError(
+                self._file, f"damaged: topic {self.name!r} holds {count} messages, not as many as counted"
+            )
+        time = np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
+        columns = {path: np.concatenate(parts) for path, parts in self._columns.items()}
+        texts = self._shape.texts if self._shape else {}
+        messages = tuple(self._messages) if self._decoding else None
+        return Topic(self.name, self._schema.name, time, columns, texts, messages)
+
+    def _add_rows(self, run: Run) -> bool:
+        if run.rows is None:
+            return False
+        if self._shape is None:
+            self._shape = shape_of(self._type.DESCRIPTOR, run.rows[0].tobytes())
+        if self._shape is None or not self._shape.fits(run.rows):
+            return False
+        for path, slot in self._shape.slots.items():
+            self._columns.setdefault(path, []).append(np.ascontiguousarray(slot.read(run.rows)))
+        return True
+
+    def _decode(self, data: bytes) -> Message:
+        try:
+            return self._type.FromString(data)
+        except DecodeError as error:
+            raise RecordingError(
+                self._file, f"topic {self.name!r} holds a message that its schema cannot read: {error}"
+            ) from None
+
+
+def flatten(message: Message) -> dict[str, Any]:
+    """Return a message's values by field path; singular fields that are not set have their default, repeated none."""
+    result: dict[str, Any] = {}
+    _flatten(message, "", result)
+    return result
+
+
+def _flatten(message: Message, prefix: str, result: dict[str, Any]) -> None:
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        path = prefix + field.name
+        if field.type == FieldDescriptor.TYPE_MESSAGE:
+            if field.is_repeated:
+                for index, item in enumerate(value):
+                    _flatten(item, f"{path}[{index}].", result)
+            elif message.HasField(field.name):
+                _flatten(value, f"{path}.", result)
+        elif field.is_repeated:
+            result[path] = list(value)
+        else:
+            result[path] = value

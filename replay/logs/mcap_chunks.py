@@ -1,0 +1,114 @@
+"""What a chunk of an MCAP file holds: unpacked within limits, checked, and cut into messages."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import lz4.frame  # type: ignore[import-untyped]
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from replay.errors import RecordingError
+from replay.logs.mcap_records import MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
+
+MAX_CHUNK = 1 << 28
+"""Largest chunk [bytes, unpacked] that is read; a larger size is damage or an attack."""
+
+_MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Messages of one channel in a chunk.
+
+    Attributes:
+        channel: the channel's id.
+        time: (n,) log times [ns].
+        rows: (n, length) the messages as bytes when all have the same length, else None.
+        payloads: the messages' bytes one by one when `rows` is None, else empty.
+    """
+
+    channel: int
+    time: NDArray[np.int64]
+    rows: NDArray[np.uint8] | None
+    payloads: tuple[bytes, ...]
+
+    def messages(self) -> list[bytes]:
+        """Return the messages' bytes one by one."""
+        return list(self.payloads) if self.rows is None else [row.tobytes() for row in self.rows]
+
+
+def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
+    """Return a chunk's records; RecordingError when they do not unpack to the size and checksum that it claims."""
+    size = chunk.uncompressed_size
+    if size > MAX_CHUNK:
+        raise _damage(file, chunk, f"claims {size} bytes, more than the {MAX_CHUNK} that are read")
+    try:
+        if chunk.compression == "zstd":
+            if zstandard.frame_content_size(packed) not in (size, -1):
+                raise _damage(file, chunk, "does not unpack to the size it claims")
+            data = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size) if size else b""
+        elif chunk.compression == "lz4":
+            data = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+        elif chunk.compression == "":
+            data = packed
+        else:
+            raise _damage(file, chunk, f"is packed by an unknown method, {chunk.compression!r}")
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
+        raise _damage(file, chunk, f"cannot be unpacked ({error})") from None
+    if len(data) != size:
+        raise _damage(file, chunk, "does not unpack to the size it claims")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise _damage(file, chunk, "has a wrong checksum")
+    return data
+
+
+def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
+    """Return a chunk's messages when all are of one channel and one length (found by one comparison), else None."""
+    if len(data) < _MESSAGE_ROW or data[0] != Op.MESSAGE:
+        return None
+    stride = RECORD_HEAD + int.from_bytes(data[1:RECORD_HEAD], "little")
+    if stride < _MESSAGE_ROW or len(data) % stride:
+        return None
+    rows = np.frombuffer(data, dtype=np.uint8).reshape(-1, stride)
+    if not bool((rows[:, :11] == rows[0, :11]).all()):
+        return None
+    stamps = rows[:, 15:23].copy().view("<u8")[:, 0]
+    _check_times(file, chunk, int(stamps.min()), int(stamps.max()))
+    channel = int.from_bytes(data[9:11], "little")
+    return Run(channel, stamps.astype(np.int64), rows[:, _MESSAGE_ROW:], ())
+
+
+def read_message(file: str, chunk: Chunk, content: bytes) -> tuple[int, int, bytes]:
+    """Return channel id, log time [ns] and data of one message record of a chunk."""
+    if len(content) < MESSAGE_HEAD:
+        raise _damage(file, chunk, "holds a message that ends inside a value")
+    channel, stamp = struct.unpack_from("<H4xQ", content)
+    _check_times(file, chunk, stamp, stamp)
+    return channel, stamp, content[MESSAGE_HEAD:]
+
+
+def records(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, begin and end of the content of records that follow one another."""
+    at = 0
+    while at < len(data):
+        if at + RECORD_HEAD > len(data):
+            raise RecordingError(file, "damaged: a record ends inside its head")
+        op, length = struct.unpack_from("<BQ", data, at)
+        begin, at = at + RECORD_HEAD, at + RECORD_HEAD + length
+        if at > len(data):
+            raise RecordingError(file, "damaged: a record is longer than what holds it")
+        yield op, begin, at
+
+
+def _check_times(file: str, chunk: Chunk, first: int, last: int) -> None:
+    if last >= 2**63 or first < chunk.start_time or last > chunk.end_time:
+        raise _damage(file, chunk, "holds a message outside its time range")
+
+
+def _damage(file: str, chunk: Chunk, reason: str) -> RecordingError:
+    return RecordingError(file, f"damaged: the chunk at byte {chunk.begin} {reason}")

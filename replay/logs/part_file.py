@@ -1,0 +1,83 @@
+"""A file that appears under its name only when it is whole."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+from replay.errors import RecordingExistsError, WriteError
+
+
+class PartFile:
+    """A binary file written as NAME.part, made durable and renamed to NAME when it is complete.
+
+    Attributes:
+        path: the final name.
+        part: the name while it is written; what a killed process leaves behind.
+    """
+
+    def __init__(self, path: Path, *, overwrite: bool) -> None:
+        """Create the folder and the `.part` file; one left over from a killed run is replaced.
+
+        Raises:
+            RecordingExistsError: `path` exists and `overwrite` is false.
+            WriteError: the file cannot be created.
+        """
+        self.path = path
+        self.part = path.with_name(path.name + ".part")
+        if path.exists() and not overwrite:
+            raise RecordingExistsError(str(path))
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream: BinaryIO = self.part.open("wb")
+        except OSError as error:
+            raise write_error(path, error) from None
+
+    def write(self, data: bytes | memoryview) -> None:
+        """Append bytes; WriteError when the disk is full or fails."""
+        try:
+            self._stream.write(data)
+        except OSError as error:
+            raise write_error(self.path, error) from None
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system, so that it survives the end of this process."""
+        try:
+            self._stream.flush()
+        except OSError as error:
+            raise write_error(self.path, error) from None
+
+    def commit(self) -> None:
+        """Make the file durable and give it its name."""
+        try:
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+            self._stream.close()
+            self.part.replace(self.path)
+            _sync_folder(self.path.parent)
+        except OSError as error:
+            raise write_error(self.path, error) from None
+
+    def discard(self) -> None:
+        """Close and remove the unfinished file; never raises, because it runs while another error is on its way."""
+        with contextlib.suppress(OSError):  # the buffered rest may not fit on a full disk; the file goes away anyway
+            self._stream.close()
+        with contextlib.suppress(OSError):
+            self.part.unlink(missing_ok=True)
+
+
+def write_error(path: Path, error: OSError) -> WriteError:
+    """Return the WriteError that says why the system refused `path`."""
+    return WriteError(str(path), error.strerror or str(error))
+
+
+def _sync_folder(folder: Path) -> None:
+    if os.name == "nt":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,223 @@
+"""Recordings as tables for other programs: CSV, JSON or Parquet, with the unit in each column's name.
+
+Numbers keep all their digits. What is not a number stays so: `nan`, `inf` and `-inf` in CSV, the texts "NaN",
+"Infinity" and "-Infinity" in JSON (as in protobuf's JSON), NaN and infinities in Parquet.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import json
+import re
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision.columns import Level
+from replay.errors import InvalidValue
+from replay.logs.part_file import PartFile
+from replay.recording.provenance import RECORD
+from replay.recording.reader import Recording
+from replay.recording.topics import WORLD
+from replay.sensing.columns import Detection
+
+Column = NDArray[Any]
+Table = dict[str, Column]
+Format = Literal["csv", "json", "parquet"]
+
+FORMATS: tuple[Format, ...] = ("csv", "json", "parquet")
+
+_LEVELS = np.array([level.name.lower() for level in Level])
+_DETECTIONS = np.array([status.name.lower() for status in Detection])
+
+
+def tables(recording: Recording) -> dict[str, Table]:
+    """Return a recording as one table a topic: columns by name, the unit in brackets, of equal length (F,)."""
+    time: Table = {"time [ns]": recording.time}
+    layout = recording.layout
+    result: dict[str, Table] = {"/joint_states": dict(time), "/tf": dict(time)}
+    for joint, (name, unit) in enumerate(zip(layout.joints, layout.joint_units, strict=True)):
+        result["/joint_states"][f"{name} position [{unit}]"] = recording.joint_positions[:, joint]
+        result["/joint_states"][f"{name} velocity [{unit}/s]"] = recording.joint_velocities[:, joint]
+    for link, name in enumerate(layout.links):
+        place = f"{name} in {WORLD}"
+        _vector(result["/tf"], place, " [m]", recording.link_poses[:, link, :3, 3], "xyz")
+        _vector(result["/tf"], f"{place} quat", "", recording.link_quaternions[:, link], "xyzw")
+    if recording.collision is not None:
+        result["/collision"] = {**time, **_collision(recording)}
+    for sensor, name in enumerate(layout.distance_sensors if recording.distance is not None else ()):
+        result[f"/distance/{name}"] = {**time, **_distance(recording, sensor)}
+    for sensor, name in enumerate(layout.capacitive_sensors if recording.capacitive is not None else ()):
+        result[f"/capacitive/{name}"] = {**time, **_capacitive(recording, sensor)}
+    events = recording.events
+    result["/events"] = {
+        "time [ns]": np.array([event.time for event in events], dtype=np.int64),
+        "frame": np.array([event.frame for event in events], dtype=np.int64),
+        "kind": np.array([event.kind for event in events], dtype=np.str_),
+        "begins": np.array([event.begins for event in events], dtype=np.bool_),
+        "subject": np.array([event.subject for event in events], dtype=np.str_),
+    }
+    return result
+
+
+def export(
+    recording: Recording,
+    directory: str | Path,
+    *,
+    format: Format,
+    topics: Collection[str] = ("*",),
+    overwrite: bool = False,
+) -> tuple[Path, ...]:
+    """Write topics of a recording into a directory.
+
+    Args:
+        recording: what `read` returned.
+        directory: where; made when it is not there.
+        format: "csv" and "parquet" give a file a topic, NAME.TOPIC.csv; "json" gives one file, NAME.json.
+        topics: globs on topic names, such as "/distance/*".
+        overwrite: replace files that exist.
+
+    Returns:
+        The files written.
+
+    Raises:
+        InvalidValue: an unknown format, or a glob that matches no topic.
+        RecordingExistsError: a file exists and may not be overwritten.
+        WriteError: a file cannot be written.
+    """
+    if format not in FORMATS:
+        raise InvalidValue("format", format, f"must be one of {', '.join(FORMATS)}")
+    all_tables = tables(recording)
+    for pattern in topics:
+        if not fnmatch.filter(all_tables, pattern):
+            raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(all_tables))}")
+    chosen = {
+        topic: table
+        for topic, table in sorted(all_tables.items())
+        if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)
+    }
+    directory = Path(directory)
+    stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
+    if format == "json":
+        return (_write(directory / f"{stem}.json", _json(recording, chosen), overwrite),)
+    names = _file_names(stem, chosen, format)
+    encode = _csv if format == "csv" else _parquet
+    return tuple(_write(directory / names[t], encode(recording, table), overwrite) for t, table in chosen.items())
+
+
+def _collision(recording: Recording) -> Table:
+    columns, table = recording.collision, Table()
+    assert columns is not None
+    for pair, name in enumerate(recording.layout.pairs):
+        table[f"{name} level"] = _LEVELS[columns.level[:, pair]]
+        table[f"{name} clearance [m]"] = columns.clearance[:, pair]
+        table[f"{name} evaluated"] = columns.evaluated[:, pair]
+        table[f"{name} undecided"] = columns.undecided[:, pair]
+    return table
+
+
+def _distance(recording: Recording, sensor: int) -> Table:
+    columns = recording.distance
+    assert columns is not None
+    shapes = np.array([*recording.layout.shapes, ""])  # the last one, index -1, while nothing is detected
+    table: Table = {
+        "status": _DETECTIONS[columns.status[:, sensor]],
+        "distance [m]": columns.distance[:, sensor],
+    }
+    _vector(table, f"point in {WORLD}", " [m]", columns.point[:, sensor], "xyz")
+    _vector(table, "point in sensor", " [m]", columns.point_sensor[:, sensor], "xyz")
+    _vector(table, f"normal in {WORLD}", "", columns.normal[:, sensor], "xyz")
+    table["shape"] = shapes[columns.shape[:, sensor]]
+    table["triangle"] = columns.triangle[:, sensor]
+    table["case"] = columns.case[:, sensor]
+    return table
+
+
+def _capacitive(recording: Recording, sensor: int) -> Table:
+    columns = recording.capacitive
+    assert columns is not None
+    table: Table = {
+        "capacitance [F]": columns.capacitance[:, sensor],
+        "output voltage [V]": columns.output_voltage[:, sensor],
+        "delta output [V]": columns.delta_output[:, sensor],
+        "saturated": columns.saturated[:, sensor],
+        "touching": columns.touching[:, sensor],
+    }
+    for index, name in enumerate(recording.layout.objects):
+        table[f"{name} capacitance [F]"] = columns.per_object[:, sensor, index]
+    return table
+
+
+def _vector(table: Table, name: str, unit: str, values: Column, letters: str) -> None:
+    for axis, letter in enumerate(letters):
+        table[f"{name} {letter}{unit}"] = values[:, axis]
+
+
+def _file_names(stem: str, topics: Collection[str], extension: str) -> dict[str, str]:
+    """Return a file name for each topic: letters that a path may not have are replaced, names stay different."""
+    names: dict[str, str] = {}
+    for topic in topics:
+        base = f"{stem}.{re.sub(r'[^A-Za-z0-9_-]+', '_', topic).strip('_')}"
+        name, number = f"{base}.{extension}", 2
+        while name in names.values():
+            name, number = f"{base}_{number}.{extension}", number + 1
+        names[topic] = name
+    return names
+
+
+def _arrow(recording: Recording, table: Mapping[str, Column]) -> Any:
+    import pyarrow
+
+    metadata = {RECORD: json.dumps(recording.provenance.to_metadata(), sort_keys=True)}
+    columns = {name: pyarrow.array(np.ascontiguousarray(values)) for name, values in table.items()}
+    return pyarrow.table(columns, metadata=metadata)
+
+
+def _csv(recording: Recording, table: Mapping[str, Column]) -> bytes:
+    import pyarrow
+    import pyarrow.csv
+
+    sink = pyarrow.BufferOutputStream()
+    pyarrow.csv.write_csv(_arrow(recording, table), sink)
+    data: bytes = sink.getvalue().to_pybytes()
+    return data
+
+
+def _parquet(recording: Recording, table: Mapping[str, Column]) -> bytes:
+    import pyarrow
+    import pyarrow.parquet
+
+    sink = pyarrow.BufferOutputStream()
+    pyarrow.parquet.write_table(_arrow(recording, table), sink)
+    data: bytes = sink.getvalue().to_pybytes()
+    return data
+
+
+def _json(recording: Recording, chosen: Mapping[str, Table]) -> bytes:
+    provenance = {key: json.loads(value) for key, value in recording.provenance.to_metadata().items()}
+    topics = {
+        topic: {name: [_plain(value) for value in values.tolist()] for name, values in table.items()}
+        for topic, table in chosen.items()
+    }
+    document = {"provenance": provenance, "lost_frames": recording.lost_frames, "topics": topics}
+    return json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1).encode()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float) and not np.isfinite(value):
+        return "NaN" if np.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
+    return value
+
+
+def _write(path: Path, data: bytes, overwrite: bool) -> Path:
+    file = PartFile(path, overwrite=overwrite)
+    try:
+        file.write(data)
+        file.commit()
+    except BaseException:
+        file.discard()
+        raise
+    return path

@@ -1,0 +1,139 @@
+"""A picture of a rerun recording at one moment, rendered by the viewer without a display."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from replay.errors import ViewerError
+from replay.recording.blueprint import TIMELINE
+
+_STARTUP = 60.0  # [s] until the viewer must answer
+_LOADING = 60.0  # [s] until the picture must have come to rest
+_TOASTS = 7.0  # [s] the viewer's own notices stand over the picture when it starts
+_PAUSE = 0.5
+
+
+def viewer_binary() -> Path:
+    """Return the viewer program that comes with the rerun package.
+
+    The `rerun` script beside it starts it as a child, which then outlives a script that is stopped.
+
+    Raises:
+        ViewerError: the package has none.
+    """
+    spec = importlib.util.find_spec("rerun_cli")
+    folder = Path(spec.origin).parent if spec and spec.origin else None
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    if folder is None or not (folder / name).is_file():
+        raise ViewerError("the rerun viewer is not installed; pip install rerun-sdk brings it")
+    return folder / name
+
+
+def picture(
+    recording: str | Path, png: str | Path, *, at: float | None = None, size: tuple[int, int] = (1280, 800)
+) -> None:
+    """Render a recording as the viewer shows it.
+
+    Args:
+        recording: an `.rrd` file.
+        png: the picture to write.
+        at: moment to show [s] from the start; its end when None.
+        size: width and height of the viewer's window [points]; the picture has two pixels a point.
+
+    Raises:
+        ViewerError: the viewer is not installed, cannot render here (it needs a Vulkan driver, such as Debian's
+            mesa-vulkan-drivers), cannot read the recording, or does not come to rest in time.
+    """
+    recording, png = Path(recording), Path(png)
+    if not recording.is_file():
+        raise ViewerError(f"{recording}: no such file")
+    with _viewer(recording.resolve(), size) as viewer:
+        began = time.monotonic()
+        state = _when(viewer.get_state, lambda s: s.recordings and not s.loading, _LOADING, f"{recording}: not loaded")
+        shown = state.recordings[0]
+        lines = {line.name: line for line in shown.timelines}
+        if TIMELINE not in lines or lines[TIMELINE].end is None:
+            raise ViewerError(f"{recording}: has no timeline {TIMELINE!r}; is it a recording of replay?")
+        moment = int(lines[TIMELINE].end) if at is None else round(at * 1e9)
+        viewer.set_time(TIMELINE, duration=_nanoseconds(moment), play_state="paused")
+        time.sleep(max(0.0, _TOASTS - (time.monotonic() - began)))
+        pictures = [b"", viewer.take_screenshot()]
+        deadline = time.monotonic() + _LOADING
+        while pictures[-1] != pictures[-2]:
+            if time.monotonic() > deadline:
+                raise ViewerError(f"{recording}: the viewer's picture did not come to rest in {_LOADING:.0f} s")
+            time.sleep(_PAUSE)
+            pictures = [pictures[-1], viewer.take_screenshot()]
+    try:
+        png.write_bytes(pictures[-1])
+    except OSError as error:
+        raise ViewerError(f"{png}: cannot be written: {error.strerror}") from None
+
+
+@contextlib.contextmanager
+def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
+    """Run a viewer of its own, which nobody else can reach, and yield the client that steers it."""
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [str(viewer_binary()), str(recording), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    command += ["--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen"]
+    environment = {**os.environ, "RERUN_ANALYTICS": "0"}
+    with tempfile.TemporaryFile("w+") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
+        try:
+            yield _connect(ViewerClient, f"rerun+http://127.0.0.1:{port}/proxy", process, log)
+        finally:
+            process.terminate()
+            try:
+                process.wait(timeout=10.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def _connect(client_type: Any, url: str, process: subprocess.Popen[bytes], log: IO[str]) -> Any:
+    deadline = time.monotonic() + _STARTUP
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            log.seek(0)
+            text = log.read()
+            cause = "it found no Vulkan driver; on Debian, apt-get install mesa-vulkan-drivers"
+            if "adapter" not in text.lower():
+                cause = (text.strip().splitlines() or ["no message"])[-1]
+            raise ViewerError(f"the rerun viewer stopped at once: {cause}")
+        try:
+            client = client_type.connect(url)
+            client.get_state()
+            return client
+        except Exception:  # whatever the library raises while nobody listens yet
+            time.sleep(_PAUSE)
+    raise ViewerError(f"the rerun viewer did not answer in {_STARTUP:.0f} s")
+
+
+def _when(get: Any, ready: Any, seconds: float, reason: str) -> Any:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        value = get()
+        if ready(value):
+            return value
+        time.sleep(_PAUSE)
+    raise ViewerError(f"{reason} in {seconds:.0f} s")
+
+
+def _nanoseconds(value: int) -> Any:
+    import numpy as np
+
+    return np.timedelta64(value, "ns")

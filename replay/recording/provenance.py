@@ -1,0 +1,145 @@
+"""Where a recording comes from: versions, model, inputs; and the names behind its columns.
+
+Nothing here depends on the machine's name, the clock or a path, so that the same inputs give the same bytes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata, resources
+from importlib.resources.abc import Traversable
+from typing import Any
+
+import replay
+from replay.errors import RecordingError
+from replay.simulation import BLOCK_FRAMES, Layout
+
+FORMAT = 1
+"""Version of the recording format that is written."""
+READABLE_FORMATS = (1,)
+"""Versions that are read: the one that is written and, once there is one, the one before."""
+RECORD = "replay"
+"""Name of the MCAP metadata record that holds the provenance."""
+LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
+
+_SOURCES = (".py", ".proto", ".binpb", ".yaml")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a recording says about itself.
+
+    Attributes:
+        scenario: name of the scenario.
+        root: name of the attachment that is the scenario itself; it refers to the others by their names.
+        frames: frames that the scenario has; a salvaged recording holds fewer.
+        layout: the names behind the columns.
+        model: the resolved model, with the revision of each method.
+        files: SHA-256 of each input file, by its name among the attachments.
+        code: SHA-256 of the package's sources.
+        version: of the package.
+        libraries: versions of the libraries that numbers may depend on.
+        block_frames: frames a block.
+        format: version of the recording format.
+    """
+
+    scenario: str
+    root: str
+    frames: int
+    layout: Layout
+    model: Mapping[str, Any]
+    files: Mapping[str, str]
+    code: str
+    version: str
+    libraries: Mapping[str, str]
+    block_frames: int = BLOCK_FRAMES
+    format: int = FORMAT
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the values of the MCAP metadata record, each as JSON with sorted keys."""
+        values = dataclasses.asdict(self)
+        return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
+
+    @staticmethod
+    def from_metadata(file: str, values: Mapping[str, str]) -> Provenance:
+        """Return the provenance that a metadata record holds.
+
+        Raises:
+            RecordingError: the format version is not one that is read, or a value is missing or not what it should be.
+        """
+        try:
+            version = json.loads(values["format"])
+            if version not in READABLE_FORMATS:
+                readable = " and ".join(map(str, READABLE_FORMATS))
+                raise RecordingError(file, f"has recording format {version}; this version of replay reads {readable}")
+            known = {field.name: json.loads(values[field.name]) for field in dataclasses.fields(Provenance)}
+            names = {field.name: known["layout"][field.name] for field in dataclasses.fields(Layout)}
+            if not all(isinstance(name, str) for group in names.values() for name in group):
+                raise TypeError("names must be texts")
+            known["layout"] = Layout(**{key: tuple(group) for key, group in names.items()})
+            if not isinstance(known["frames"], int) or not isinstance(known["block_frames"], int):
+                raise TypeError("frame counts must be integers")
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise RecordingError(file, f"damaged: its metadata cannot be used ({error!r})") from None
+        return Provenance(**known)
+
+
+def sha256(data: bytes) -> str:
+    """Return the SHA-256 of bytes as hexadecimal text."""
+    return hashlib.sha256(data).hexdigest()
+
+
+@functools.cache
+def code_identity() -> str:
+    """Return a SHA-256 over names and contents of the package's sources: the same wherever it is installed."""
+    digest = hashlib.sha256()
+    for name, data in sorted(_sources(resources.files("replay"), "")):
+        digest.update(f"{name}\0{len(data)}\0".encode())
+        digest.update(data)
+    return digest.hexdigest()
+
+
+@functools.cache
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that numbers may depend on, without importing them."""
+    versions = {"python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def describe(
+    scenario: str, root: str, files: Mapping[str, bytes], *, frames: int, layout: Layout, model: Mapping[str, Any]
+) -> Provenance:
+    """Return the provenance of a recording that this package, in this environment, is about to make."""
+    return Provenance(
+        scenario=scenario,
+        root=root,
+        frames=frames,
+        layout=layout,
+        model=model,
+        files={name: sha256(data) for name, data in sorted(files.items())},
+        code=code_identity(),
+        version=replay.__version__,
+        libraries=library_versions(),
+    )
+
+
+def _sources(folder: Traversable, prefix: str) -> list[tuple[str, bytes]]:
+    found = []
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            if entry.name != "__pycache__":
+                found += _sources(entry, f"{prefix}{entry.name}/")
+        elif entry.name.endswith(_SOURCES):
+            found.append((prefix + entry.name, entry.read_bytes()))
+    return found

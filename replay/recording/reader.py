@@ -1,0 +1,254 @@
+"""An MCAP recording back to the columns that were written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision.columns import CollisionColumns
+from replay.errors import RecordingError
+from replay.logs.columns import Topic, read_topics
+from replay.logs.mcap_reader import Loss, McapLog
+from replay.numerics import transforms
+from replay.recording.events import Event
+from replay.recording.provenance import RECORD, Provenance
+from replay.recording.topics import (
+    CAPACITIVE_FIELDS,
+    COLLISION_FIELDS,
+    DISTANCE_SCALARS,
+    DISTANCE_VECTORS,
+)
+from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.simulation import Layout
+
+Floats = NDArray[np.float64]
+
+_DTYPES = {
+    "level": np.uint8,
+    "status": np.uint8,
+    "case": np.uint8,
+    "shape": np.int32,
+    "triangle": np.int32,
+    "evaluated": np.bool_,
+    "undecided": np.bool_,
+    "saturated": np.bool_,
+    "touching": np.bool_,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A whole recording: the columns of `FrameBlock` for all F frames.
+
+    Every number is the one that was written, bit by bit, except `link_poses`: a pose is stored as translation and
+    unit quaternion (`link_quaternions`), and its rotation matrix is computed again from that.
+
+    Attributes:
+        path: the file.
+        provenance: where it comes from; `layout` is the provenance's.
+        time: (F,) int64 [ns] from the scenario's start.
+        joint_positions: (F, J) [rad or m].
+        joint_velocities: (F, J) [rad/s or m/s].
+        link_poses: (F, L, 4, 4), T_world_link.
+        link_quaternions: (F, L, 4), rotation of T_world_link, xyzw, w >= 0.
+        collision, distance, capacitive: see there; None when the scene does not ask for it.
+        events: in the order of time.
+        files: the scenario and every file that it needs, by name.
+        loss: what a salvaged file has lost, else None.
+        lost_frames: frames of the scenario that are not there; 0 unless salvaged.
+    """
+
+    path: Path
+    provenance: Provenance
+    time: NDArray[np.int64]
+    joint_positions: Floats
+    joint_velocities: Floats
+    link_poses: Floats
+    link_quaternions: Floats
+    collision: CollisionColumns | None
+    distance: DistanceColumns | None
+    capacitive: CapacitiveColumns | None
+    events: tuple[Event, ...]
+    files: Mapping[str, bytes]
+    loss: Loss | None
+    lost_frames: int
+
+    @property
+    def layout(self) -> Layout:
+        """The names behind the columns."""
+        return self.provenance.layout
+
+
+def read(path: str | Path, *, salvage: bool = False) -> Recording:
+    """Return a recording.
+
+    Args:
+        path: an MCAP file that `replay` wrote.
+        salvage: of a file that was cut or damaged, keep the whole blocks before the damage instead of refusing it;
+            `loss` and `lost_frames` then say what is missing.
+
+    Raises:
+        RecordingError: the file cannot be read, is not a recording, has another format version, or is damaged
+            (with `salvage`: so early that nothing can be kept).
+    """
+    with McapLog(path, salvage=salvage) as log:
+        return _Assembly(log).recording()
+
+
+def read_provenance(log: McapLog) -> Provenance:
+    """Return the provenance of an opened recording; RecordingError when it has none."""
+    found = [values for name, values in log.metadata if name == RECORD]
+    if len(found) != 1:
+        raise RecordingError(str(log.path), f"is not a recording of replay: it has no metadata record {RECORD!r}")
+    return Provenance.from_metadata(str(log.path), found[0])
+
+
+class _Assembly:
+    """Puts the topics of one recording together."""
+
+    def __init__(self, log: McapLog) -> None:
+        self._log = log
+        self._file = str(log.path)
+        self._provenance = read_provenance(log)
+        self._layout = self._provenance.layout
+        if log.loss is None and not log.checked:
+            raise RecordingError(self._file, "damaged: a checksum that every recording has is missing")
+        if log.loss is not None and not any(name == "preamble" for name, _ in log.metadata):
+            raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
+        names = {channel.topic for channel in log.channels.values()}
+        self._topics = read_topics(log, names - {"/scene"}, as_messages={"/events"})
+        self._frames = self._whole_frames()
+
+    def recording(self) -> Recording:
+        layout, count = self._layout, len(self._frames)
+        joints, tf = self._topic("/joint_states"), self._topic("/tf")
+        positions = [self._column(joints, f"joints[{j}].position") for j in range(len(layout.joints))]
+        velocities = [self._column(joints, f"joints[{j}].velocity") for j in range(len(layout.joints))]
+        links = range(len(layout.links))
+        translation = [[self._column(tf, f"transforms[{k}].translation.{c}") for c in "xyz"] for k in links]
+        rotation = [[self._column(tf, f"transforms[{k}].rotation.{c}") for c in "xyzw"] for k in links]
+        quaternions = _stack([_stack(parts, count) for parts in rotation], count, 4)
+        poses = transforms.from_quaternion(quaternions) if links else np.zeros((count, 0, 4, 4))
+        poses[..., :3, 3] = _stack([_stack(parts, count) for parts in translation], count, 3)
+        self._check_names(joints, "joints[{}].name", layout.joints)
+        self._check_names(tf, "transforms[{}].child_frame_id", layout.links)
+        return Recording(
+            path=self._log.path,
+            provenance=self._provenance,
+            time=self._frames,
+            joint_positions=_stack(positions, count),
+            joint_velocities=_stack(velocities, count),
+            link_poses=poses,
+            link_quaternions=quaternions,
+            collision=self._collision(),
+            distance=self._distance(),
+            capacitive=self._capacitive(),
+            events=self._events(),
+            files={entry.name: self._log.attachment(entry) for entry in self._log.attachments},
+            loss=self._log.loss,
+            lost_frames=self._provenance.frames - count,
+        )
+
+    def _whole_frames(self) -> NDArray[np.int64]:
+        """Return the times of the frames of whole blocks: those that every topic of the recording has."""
+        per_frame = [topic for name, topic in self._topics.items() if name != "/events"]
+        if not per_frame:
+            raise RecordingError(self._file, "damaged: it has no topics")
+        count = min(len(topic.time) for topic in per_frame)
+        if self._log.loss is not None:
+            block = self._provenance.block_frames
+            count = count if count == self._provenance.frames else count // block * block
+        time = self._topic("/joint_states").time[:count]
+        for topic in per_frame:
+            if not np.array_equal(topic.time[:count], time) or (self._log.loss is None and len(topic.time) != count):
+                raise RecordingError(self._file, f"damaged: topic {topic.name!r} has other frames than /joint_states")
+        if not bool((np.diff(time) > 0).all()):
+            raise RecordingError(self._file, "damaged: its frames are not in the order of time")
+        if self._log.loss is None and count != self._provenance.frames:
+            raise RecordingError(
+                self._file, f"damaged: it holds {count} frames, its scenario has {self._provenance.frames}"
+            )
+        return time
+
+    def _topic(self, name: str) -> Topic:
+        if name not in self._topics:
+            raise RecordingError(self._file, f"damaged: topic {name!r} is missing")
+        return self._topics[name]
+
+    def _column(self, topic: Topic, path: str, count: int | None = None) -> NDArray[Any]:
+        """Return a field of all frames, (F,) or, with `count`, (F, count)."""
+        frames = len(self._frames)
+        column = topic.columns.get(path)
+        if column is None and (count == 0 or not len(topic.time)) and topic.messages is None:
+            column = np.zeros((len(topic.time), *(() if count is None else (count,))))
+        if column is None or column.shape[1:] != (() if count is None else (count,)):
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is missing or misshapen")
+        return column[:frames].astype(_DTYPES.get(path, np.float64), copy=False)
+
+    def _check_names(self, topic: Topic, path: str, names: tuple[str, ...]) -> None:
+        if any(topic.texts.get(path.format(index)) != name for index, name in enumerate(names)) and len(self._frames):
+            raise RecordingError(
+                self._file, f"damaged: the names in topic {topic.name!r} are not those of its metadata"
+            )
+
+    def _collision(self) -> CollisionColumns | None:
+        if "/collision" not in self._topics:
+            return None
+        topic = self._topic("/collision")
+        return CollisionColumns(**{f: self._column(topic, f, len(self._layout.pairs)) for f in COLLISION_FIELDS})
+
+    def _distance(self) -> DistanceColumns | None:
+        topics = [self._topics.get(f"/distance/{name}") for name in self._layout.distance_sensors]
+        present = [topic for topic in topics if topic is not None]
+        if not present:
+            return None
+        columns: dict[str, Any] = {
+            field: _stack([self._column(topic, field) for topic in present], len(self._frames))
+            for field in DISTANCE_SCALARS
+        }
+        for field in DISTANCE_VECTORS:
+            vectors = [[self._column(topic, f"{field}.{letter}") for letter in "xyz"] for topic in present]
+            columns[field] = np.stack([np.stack(parts, axis=1) for parts in vectors], axis=1)
+        self._all_present(len(present), "distance_sensors")
+        return DistanceColumns(**columns)
+
+    def _capacitive(self) -> CapacitiveColumns | None:
+        topics = [self._topics.get(f"/capacitive/{name}") for name in self._layout.capacitive_sensors]
+        present = [topic for topic in topics if topic is not None]
+        if not present:
+            return None
+        columns = {
+            field: np.stack(
+                [self._column(t, field, len(self._layout.objects) if field == "per_object" else None) for t in present],
+                axis=1,
+            )
+            for field in CAPACITIVE_FIELDS
+        }
+        self._all_present(len(present), "capacitive_sensors")
+        return CapacitiveColumns(**columns)
+
+    def _all_present(self, count: int, group: str) -> None:
+        if count != len(getattr(self._layout, group)):
+            raise RecordingError(self._file, f"damaged: its metadata name more {group} than it has topics")
+
+    def _events(self) -> tuple[Event, ...]:
+        topic = self._topic("/events")
+        last = int(self._frames[-1]) if len(self._frames) else -1
+        try:
+            return tuple(
+                Event.from_message(time, message)
+                for time, message in zip(topic.time.tolist(), topic.messages or (), strict=True)
+                if time <= last
+            )
+        except ValueError as error:
+            raise RecordingError(self._file, f"damaged: topic '/events' holds {str(error)!r}") from None
+
+
+def _stack(columns: list[Any], frames: int, *rest: int) -> Any:
+    """Return columns side by side, (F, n, ...); (F, 0, ...) when there are none."""
+    return np.stack(columns, axis=1) if columns else np.zeros((frames, 0, *rest))

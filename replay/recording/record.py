@@ -1,0 +1,104 @@
+"""A scenario to its recordings, in one run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from replay.recording.behind import WriteBehind, Writer
+from replay.recording.provenance import describe
+from replay.recording.scene_view import view
+from replay.recording.writer import McapWriter
+from replay.simulation import FrameBlock, Simulation
+
+if TYPE_CHECKING:
+    from replay.scenario.methods import Model
+    from replay.scenario.model import Scenario
+    from replay.scenario.scene import Scene
+
+Progress = Callable[[int, int], None]
+"""Called with the number of frames computed and the number of all frames."""
+
+
+@dataclass(frozen=True)
+class RecordedPaths:
+    """Where the recordings of a run are; `rrd` is None when none was asked for."""
+
+    mcap: Path
+    rrd: Path | None
+
+
+def record(
+    scenario: Scenario,
+    directory: str | Path,
+    *,
+    model: Model | None = None,
+    rrd: bool = True,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> RecordedPaths:
+    """Simulate a scenario and record it as DIRECTORY/NAME.mcap and DIRECTORY/NAME.rrd.
+
+    Args:
+        scenario: what `load` returned.
+        directory: made when it is not there.
+        model: replaces the scenario's own model.
+        rrd: whether to make a rerun recording too.
+        overwrite: replace recordings that exist; they stay when the run fails.
+        progress: called after each block.
+
+    Raises:
+        RecordingExistsError: a recording exists and may not be overwritten.
+        WriteError: a file cannot be written.
+        ReplayError: whatever the simulation raises; no file is left then.
+    """
+    from replay.scenario.scene import build
+
+    scene = build(scenario, model=model)
+    return record_blocks(scene, Simulation(scene).blocks(), directory, rrd=rrd, overwrite=overwrite, progress=progress)
+
+
+def record_blocks(
+    scene: Scene,
+    blocks: Iterable[FrameBlock],
+    directory: str | Path,
+    *,
+    rrd: bool = True,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> RecordedPaths:
+    """Record blocks of a scene, however they were computed; arguments and errors as of `record`."""
+    scenario = scene.scenario
+    provenance = describe(
+        scenario.name,
+        scenario.main_source,
+        scenario.sources,
+        frames=scene.frames,
+        layout=scene.layout,
+        model=scene.model.identity(),
+    )
+    shown = view(scene)
+    paths = RecordedPaths(
+        mcap=Path(directory) / f"{scenario.name}.mcap",
+        rrd=Path(directory) / f"{scenario.name}.rrd" if rrd else None,
+    )
+    mcap = McapWriter(paths.mcap, provenance, shown, scenario.sources, overwrite=overwrite)
+    writers: list[Writer] = [mcap]
+    if paths.rrd is not None:
+        from replay.recording.rerun_log import RerunWriter
+
+        try:
+            writers.insert(0, RerunWriter(paths.rrd, scene.layout, shown, overwrite=overwrite))
+        except BaseException:
+            mcap.discard()
+            raise
+    with WriteBehind(writers) as behind:  # the log of record is closed last: where it is, all is
+        done = 0
+        for block in blocks:
+            behind.put(block)
+            done += len(block.time)
+            if progress is not None:
+                progress(done, scene.frames)
+    return paths

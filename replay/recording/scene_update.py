@@ -1,0 +1,48 @@
+"""The scene as one foxglove.SceneUpdate: an entity for each body, in its link's frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from replay.logs.wire import shape_of
+from replay.recording import messages
+from replay.recording.scene_view import BodyView, Floats, SceneView, indexed
+
+
+def scene_message(scene: SceneView) -> bytes:
+    """Return the serialised foxglove.SceneUpdate of a scene."""
+    update = messages.message_class(messages.SCENE)()
+    for body in scene.bodies:
+        _add(update, body, scene.links[body.link])
+    data: bytes = update.SerializeToString(deterministic=True)
+    return data
+
+
+def _add(update: Any, body: BodyView, link: str) -> None:
+    entity = update.entities.add(id=body.name, frame_id=link, frame_locked=True)
+    entity.timestamp.SetInParent()
+    mesh = entity.triangles.add()
+    mesh.pose.position.SetInParent()
+    mesh.pose.orientation.w = 1.0
+    for channel, value in zip("rgba", body.color, strict=True):
+        setattr(mesh.color, channel, value / 255)
+    vertices, index = indexed(body.triangles)
+    mesh.MergeFromString(_points(mesh, vertices))
+    mesh.indices.extend(index.ravel().tolist())
+
+
+def _points(mesh: Any, vertices: Floats) -> bytes:
+    """Return the encoding of a mesh that has nothing but points: fields of merged messages are joined."""
+    example = type(mesh)(points=[{"x": 1.0, "y": 1.0, "z": 1.0}])
+    shape = shape_of(example.points[0].DESCRIPTOR, example.points[0].SerializeToString())
+    assert shape is not None
+    head = example.SerializeToString()[: -shape.length]
+    rows = np.empty((len(vertices), len(head) + shape.length), dtype=np.uint8)
+    rows[:, : len(head)] = np.frombuffer(head, dtype=np.uint8)
+    points = rows[:, len(head) :]
+    shape.fill(points)
+    for axis, letter in enumerate("xyz"):
+        shape.slots[letter].write(points, vertices[:, axis])
+    return rows.tobytes()

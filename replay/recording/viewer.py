@@ -1,0 +1,58 @@
+"""The rerun viewer in a window or in a browser; it never outlives the command that opened it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from replay.errors import ViewerError
+from replay.recording.picture import viewer_binary
+
+
+def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
+    """Return the `.rrd` file of each recording: the file itself, or for a `.mcap` the one beside it.
+
+    Raises:
+        ViewerError: a file is not there, or is neither.
+    """
+    files = []
+    for path in map(Path, recordings):
+        if path.suffix not in (".rrd", ".mcap"):
+            raise ViewerError(f"{path}: is neither a .rrd nor a .mcap recording")
+        if not path.is_file():
+            raise ViewerError(f"{path}: no such file")
+        rrd = path.with_suffix(".rrd")
+        if not rrd.is_file():
+            raise ViewerError(f"{path}: has no {rrd.name} beside it; `replay run {path} -o DIR` makes one")
+        files.append(rrd)
+    return files
+
+
+def show(files: Sequence[Path], *, web: bool = False) -> None:
+    """Open recordings in one viewer and wait until it is closed.
+
+    Args:
+        files: `.rrd` files; several are shown side by side.
+        web: serve the viewer to browsers on this machine (127.0.0.1 only) until interrupted.
+
+    Raises:
+        ViewerError: the viewer is not installed or fails, as it does without a display.
+    """
+    command = [str(viewer_binary()), *map(str, files)]
+    if web:
+        command += ["--web-viewer", "--bind", "127.0.0.1"]
+    process = subprocess.Popen(command, env={**os.environ, "RERUN_ANALYTICS": "0"})
+    try:
+        code = process.wait()
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(timeout=5.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+    if code != 0:
+        raise ViewerError(f"the rerun viewer failed with code {code}; without a display use --web or --screenshot")

@@ -1,0 +1,116 @@
+"""Frame blocks to an MCAP recording, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+
+from replay.errors import InvalidValue
+from replay.logs.mcap_writer import McapFileWriter
+from replay.logs.part_file import PartFile
+from replay.recording import messages
+from replay.recording.events import EventFinder
+from replay.recording.provenance import RECORD, Provenance
+from replay.recording.scene_update import scene_message
+from replay.recording.scene_view import SceneView
+from replay.recording.topics import WORLD, FrameTopic, frame_topics
+from replay.simulation import FrameBlock
+
+_MEDIA_TYPES = {
+    ".yaml": "application/yaml",
+    ".yml": "application/yaml",
+    ".csv": "text/csv",
+    ".mcap": "application/x-mcap",
+    ".stl": "model/stl",
+    ".obj": "model/obj",
+    ".ply": "model/ply",
+}
+
+
+class McapWriter:
+    """Writes one recording: NAME.mcap.part while it grows, NAME.mcap when it is whole.
+
+    A block becomes one chunk a topic. The bytes depend on the arguments and the blocks alone.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        provenance: Provenance,
+        scene: SceneView,
+        files: Mapping[str, bytes],
+        *,
+        overwrite: bool = False,
+    ) -> None:
+        """Create the file.
+
+        Args:
+            path: where the whole recording will be.
+            provenance: what it says about itself.
+            scene: what it shows.
+            files: the scenario and every file that it needs, by the names that it calls them.
+            overwrite: replace a recording that exists.
+
+        Raises:
+            RecordingExistsError: it exists and may not be overwritten.
+            WriteError: the file cannot be written.
+        """
+        if WORLD in provenance.layout.links:
+            raise InvalidValue("links", WORLD, "no link may have the name of the frame that all links are placed in")
+        self._provenance = provenance
+        self._scene = scene
+        self._files = files
+        self._file = PartFile(Path(path), overwrite=overwrite)
+        self._events = EventFinder(provenance.layout)
+        self._topics: list[tuple[FrameTopic, int]] = []
+        self._log: McapFileWriter | None = None
+        self._event_channel = 0
+
+    def write(self, block: FrameBlock) -> None:
+        """Append a block; the first one decides which groups of columns the recording has."""
+        if self._log is None:
+            self._log = self._begin(block)
+        events = self._events.find(block)
+        self._log.messages(
+            self._event_channel,
+            [event.time for event in events],
+            [event.frame for event in events],
+            [event.to_message().SerializeToString(deterministic=True) for event in events],
+        )
+        for topic, channel in self._topics:
+            self._log.rows(topic.encode(block, channel))
+        self._file.flush()
+
+    def close(self) -> None:
+        """Finish the recording and give the file its name; InvalidValue when no block was written."""
+        if self._log is None:
+            raise InvalidValue("blocks", 0, "a recording needs at least one frame")
+        self._log.finish()
+        self._file.commit()
+
+    def discard(self) -> None:
+        """Give the recording up and remove the unfinished file."""
+        self._file.discard()
+
+    def _begin(self, block: FrameBlock) -> McapFileWriter:
+        log = McapFileWriter(self._file, f"replay {self._provenance.version}")
+        log.metadata(RECORD, self._provenance.to_metadata())
+        for name, data in sorted(self._files.items()):
+            media_type = _MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
+            log.attachment(name, media_type, data)
+        topics = list(
+            frame_topics(
+                self._provenance.layout,
+                collision=block.collision is not None,
+                distance=block.distance is not None,
+                capacitive=block.capacitive is not None,
+            )
+        )
+        types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG})
+        schemas = {name: log.schema(messages.schema(name)) for name in types}
+        scene = log.channel("/scene", schemas[messages.SCENE])
+        self._event_channel = log.channel("/events", schemas[messages.LOG])
+        self._topics = [(topic, log.channel(topic.name, schemas[topic.type])) for topic in topics]
+        log.end_preamble()
+        log.messages(scene, [0], [0], [scene_message(self._scene)])
+        return log

@@ -1,0 +1,246 @@
+"""What must hold between the entries of a scenario: names exist, once, and are used for what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from replay.scenario.expectations import DistanceExpectation, PairExpectation
+from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName, matches
+from replay.scenario.problems import Path, did_you_mean
+from replay.scenario.units import (
+    ACCELERATION,
+    ANGLE,
+    ANGULAR_ACCELERATION,
+    ANGULAR_VELOCITY,
+    LENGTH,
+    VELOCITY,
+    Dimension,
+    Dimensioned,
+)
+
+WORLD = "world"
+
+Finding = tuple[Path, str]
+"""The path of a value, and the rule it breaks."""
+
+
+def check(names: Names) -> Iterator[Finding]:
+    """Yield everything that does not hold."""
+    yield from _links(names)
+    yield from _motion(names)
+    yield from _sensors(names)
+    yield from _disabled(names)
+    yield from _expectations(names)
+
+
+def _links(names: Names) -> Iterator[Finding]:
+    if not names.parents:
+        yield ("links",), "must hold at least one link"
+    for link, parent in names.parents.items():
+        if link == WORLD:
+            yield ("links", link), "must have another name: 'world' is the frame that all links stand in"
+        if parent is not None and parent not in names.parents:
+            yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"
+    yield from _circles(names.parents)
+    first: dict[str, JointName] = {}
+    for joint in names.joints:
+        if joint.type == "fixed":
+            continue
+        other = first.setdefault(joint.name, joint)
+        if other is not joint:
+            where = ("links", joint.link, "joint", "name")
+            yield where, f"names this joint {joint.name!r} like that of link {other.link!r}; joint names are unique"
+
+
+def _circles(parents: dict[str, str | None]) -> Iterator[Finding]:
+    """Find links that are their own ancestors, each circle once."""
+    settled: set[str] = set()
+    for link in parents:
+        chain: dict[str, None] = {}
+        above: str | None = link
+        while above is not None and above not in settled and above not in chain:
+            chain[above] = None
+            above = parents.get(above)
+        settled.update(chain)
+        if above is not None and above in chain:
+            circle = list(chain)[list(chain).index(above) :]
+            shown = " -> ".join([*circle[:10], *(["..."] if len(circle) > 10 else []), above])
+            yield ("links", above, "parent"), f"makes a circle: {shown}; parents must form trees"
+
+
+def _motion(names: Names) -> Iterator[Finding]:
+    joints = {joint.name: joint for joint in names.joints if joint.type != "fixed"}
+    for name, waypoints in names.points.items():
+        path: Path = ("motion", "points", name)
+        yield from _scalar_joint(path, joints, name)
+        joint = joints.get(name)
+        for index, point in enumerate(waypoints or ()):
+            if joint is not None:
+                yield from _position((*path, index, "position"), point.position, joint)
+                yield from _rate((*path, index, "velocity"), point.velocity, joint, "velocity")
+                yield from _rate((*path, index, "acceleration"), point.acceleration, joint, "acceleration")
+    for index, move in enumerate(names.moves):
+        for name, target in (move.to if move is not None else {}).items():
+            path = ("motion", "moves", index, "to", name)
+            yield from _scalar_joint(path, joints, name)
+            if name in joints:
+                yield from _position(path, target, joints[name])
+                yield from _has_limits(path, joints[name])
+            if name in names.points:
+                yield path, "is a joint that motion.points moves as well; keep one of the two"
+    free = [joint.name for joint in joints.values() if joint.type == "free"]
+    for name in names.free:
+        path = ("motion", "free", name)
+        if name not in joints:
+            yield path, f"is no joint; {did_you_mean(name, free, what='free joints are')}"
+        elif joints[name].type in SCALAR_JOINTS:
+            yield (
+                path,
+                f"is a {joints[name].type} joint; motion.free moves free joints, motion.points and moves this one",
+            )
+
+
+def _scalar_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
+    scalar = [joint.name for joint in joints.values() if joint.type in SCALAR_JOINTS]
+    if name not in joints:
+        yield path, f"is no joint that moves; {did_you_mean(name, scalar, what='joints are')}"
+    elif joints[name].type == "free":
+        yield path, "is a free joint; move it by key frames in motion.free"
+
+
+def _position(path: Path, position: Dimensioned, joint: JointName) -> Iterator[Finding]:
+    if joint.type not in SCALAR_JOINTS:
+        return
+    expected = LENGTH if joint.type == "prismatic" else ANGLE
+    wrong = _wrong_dimension(position, expected, joint)
+    if wrong is not None:
+        yield path, wrong
+    elif joint.scalar is not None and joint.scalar.type != "continuous":
+        value, lower, upper = position.value, joint.scalar.lower, joint.scalar.upper
+        if value > upper:
+            yield path, f"is above the upper limit {upper:.6g} {expected.si} of joint {joint.name!r}"
+        elif value < lower:
+            yield path, f"is below the lower limit {lower:.6g} {expected.si} of joint {joint.name!r}"
+
+
+def _rate(path: Path, rate: Dimensioned | None, joint: JointName, limit: str) -> Iterator[Finding]:
+    if rate is None or joint.type not in SCALAR_JOINTS:
+        return
+    linear, angular = (VELOCITY, ANGULAR_VELOCITY) if limit == "velocity" else (ACCELERATION, ANGULAR_ACCELERATION)
+    expected = linear if joint.type == "prismatic" else angular
+    wrong = _wrong_dimension(rate, expected, joint)
+    if wrong is not None:
+        yield path, wrong
+    elif joint.scalar is not None and abs(rate.value) > getattr(joint.scalar, limit):
+        most = getattr(joint.scalar, limit)
+        yield path, f"is beyond the {limit} limit {most:.6g} {expected.si} of joint {joint.name!r}"
+
+
+def _wrong_dimension(value: Dimensioned, expected: Dimension, joint: JointName) -> str | None:
+    if value.dimension in (None, expected):
+        return None
+    moves = f"joint {joint.name!r} is {joint.type}"
+    assert value.dimension is not None
+    return f"is {value.dimension.name} where {expected.name} belongs ({moves}); {expected.what_works}"
+
+
+def _has_limits(path: Path, joint: JointName) -> Iterator[Finding]:
+    if joint.scalar is None:
+        return
+    missing = [limit for limit in ("velocity", "acceleration") if getattr(joint.scalar, limit) == float("inf")]
+    if missing:
+        what = " and ".join(missing)
+        yield path, f"needs a finite {what} limit on joint {joint.name!r}; give it one, or use motion.points"
+
+
+def _sensors(names: Names) -> Iterator[Finding]:
+    for kind, sensors in (("distance", names.distance), ("capacitive", names.capacitive)):
+        for name, sensor in sensors.items():
+            if sensor is None:
+                continue
+            path: Path = ("sensors", kind, name)
+            if sensor.link not in names.parents:
+                rule = did_you_mean(sensor.link, names.parents, what="links are")
+                yield (*path, "link"), f"is no link; {rule}"
+            for index, pattern in enumerate(sensor.ignore):
+                if not names.links_matching(pattern):
+                    rule = did_you_mean(pattern, names.parents, what="links are")
+                    yield (*path, "ignore", index), f"matches no link; {rule}"
+
+
+def _disabled(names: Names) -> Iterator[Finding]:
+    for index, entry in enumerate(names.disable):
+        if entry is None:
+            continue
+        path: Path = ("collision", "disable", index, "pair")
+        found = list(_patterns(names, path, entry.pair))
+        yield from found
+        sides = [names.shapes_matching(pattern) for pattern in entry.pair]
+        if not found and not any(a.link != b.link for a in sides[0] for b in sides[1]):
+            yield path, f"{list(entry.pair)}: these match no two shapes on different links"
+
+
+def _patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
+    for side, pattern in enumerate(pair):
+        if not names.links_matching(pattern) and not names.shapes_matching(pattern):
+            known = [*names.parents, *(shape.full for shape in names.shapes)]
+            yield (*path, side), f"matches no link and no shape; {did_you_mean(pattern, known)}"
+
+
+def _expectations(names: Names) -> Iterator[Finding]:
+    for index, expected in enumerate(names.expect):
+        path: Path = ("expect", index)
+        if isinstance(expected, PairExpectation):
+            found = list(_patterns(names, (*path, "pair"), expected.pair))
+            yield from found or _tested(names, (*path, "pair"), expected.pair)
+            if expected.clearance is not None:
+                yield from _clearance(names, (*path, "clearance", "min"), expected.clearance.min)
+        elif isinstance(expected, DistanceExpectation):
+            if expected.distance not in names.distance:
+                rule = did_you_mean(expected.distance, names.distance, what="distance sensors are")
+                yield (*path, "distance"), f"is no distance sensor; {rule}"
+        elif expected is not None and expected.capacitive not in names.capacitive:
+            rule = did_you_mean(expected.capacitive, names.capacitive, what="capacitive sensors are")
+            yield (*path, "capacitive"), f"is no capacitive sensor; {rule}"
+
+
+def _tested(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
+    """Find that two patterns match no pair of shapes that is tested, and why."""
+    if not names.tests_pairs:
+        yield path, f"{list(pair)}: nothing is tested, since collision.pairs is none"
+        return
+    reason = "they match no two shapes on different links"
+    for a in names.shapes_matching(pair[0]):
+        for b in names.shapes_matching(pair[1]):
+            hindrance = _hindrance(names, a, b)
+            if hindrance is None:
+                return
+            reason = hindrance or reason
+    yield path, f"{list(pair)}: no pair of shapes that these match is tested: {reason}"
+
+
+def _hindrance(names: Names, a: ShapeName, b: ShapeName) -> str | None:
+    """Return why a pair is not tested; empty for shapes of one link, None when it is tested."""
+    if a.link == b.link:
+        return ""
+    if not (a.collides and b.collides):
+        return f"{(b if a.collides else a).full} has collide: false"
+    if names.parents.get(a.link) == b.link or names.parents.get(b.link) == a.link:
+        return f"links {a.link!r} and {b.link!r} are joined by a joint"
+    for index, entry in enumerate(names.disable):
+        if entry is None:
+            continue
+        first, second = entry.pair
+        if any(matches(first, x.link, x.name) and matches(second, y.link, y.name) for x, y in ((a, b), (b, a))):
+            return f"collision.disable[{index}] leaves it out"
+    return None
+
+
+def _clearance(names: Names, path: Path, least: float) -> Iterator[Finding]:
+    if names.model is None or names.margin is None:
+        return
+    if names.model.collision.clearance == "never":
+        yield path, "cannot be judged, since model.collision.clearance is never; write near or always"
+    elif names.model.collision.clearance == "near" and least > names.margin:
+        margin = f"collision.margin {names.margin:.6g} m, up to which clearances are computed"
+        yield path, f"is above {margin}; raise the margin, or write model.collision.clearance: always"

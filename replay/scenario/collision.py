@@ -1,0 +1,32 @@
+"""What is tested for collision."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import StringConstraints
+
+from replay.scenario.fields import Glob, Part
+from replay.scenario.units import Distance
+
+GlobPair = tuple[Glob, Glob]
+
+
+class Disable(Part):
+    """Pairs that are not tested."""
+
+    pair: GlobPair
+    """Two patterns, each of a link's name or of "link/shape"; a pair is left out when they match its two sides."""
+    reason: Annotated[str, StringConstraints(min_length=1, max_length=1000, strip_whitespace=True)]
+    """Why these may touch, or never can."""
+
+
+class Collision(Part):
+    """Which pairs of shapes are tested, and how closely clearances are followed."""
+
+    pairs: Literal["all", "none"] = "all"
+    """"all": every pair of shapes on different links that are not joined by a joint; "none": no pair."""
+    margin: Distance = 0.05
+    """Clearances up to this one are computed [m] (model.collision.clearance: near)."""
+    disable: tuple[Disable, ...] = ()
+    """Pairs that are left out, each with its reason."""

@@ -1,0 +1,83 @@
+"""What every part of the language shares: the base of its models, names, vectors, flags and poses."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, StrictBool, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
+
+from replay.scenario.units import Angle, Length, Number, Size
+
+
+class Part(BaseModel):
+    """A mapping of the language: unknown keys are errors, and nothing changes after validation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, hide_input_in_errors=True)
+
+
+def rejected(rule: str, at: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """Return the error to raise when a value breaks a rule; `at` leads from the validated value to the culprit."""
+    return PydanticCustomError("rule", "{rule}", {"rule": rule, "at": list(at)})
+
+
+_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
+NAME_RULE = "must start with a letter, digit or _, and go on with letters, digits, _ . or - (at most 100 characters)"
+
+Name = Annotated[str, StringConstraints(pattern=_NAME, max_length=100)]
+"""Name of a link, shape, joint, sensor or plate; it becomes part of topics and of pair names."""
+
+_TITLE = r"^[^./\\\x00-\x1f\x7f-\x9f][^/\\\x00-\x1f\x7f-\x9f]*$"
+TITLE_RULE = "must have 1 to 100 characters, must not start with '.' and must not hold / \\ or control characters"
+
+Title = Annotated[str, StringConstraints(pattern=_TITLE, max_length=100)]
+"""Name of a scenario; it becomes the name of a folder and of files."""
+
+Text = Annotated[str, StringConstraints(max_length=10_000)]
+Glob = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+"""A name, or a pattern with * ? [abc], matched with case."""
+
+Flag = StrictBool
+Vector = tuple[Length, Length, Length]
+
+
+def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*values)
+    if length < 1e-150 or not math.isfinite(length):
+        raise rejected("has no direction; at least one number must not be 0")
+    return values
+
+
+def _unit(values: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*_not_zero(values))
+    return tuple(value / length + 0.0 for value in values)
+
+
+Axis = Annotated[tuple[Number, Number, Number], AfterValidator(_unit)]
+Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit)]
+
+
+class Placement(Part):
+    """A rotation about and then a move of the origin; `rpy` and `quat_xyzw` exclude each other."""
+
+    xyz: Vector = (0.0, 0.0, 0.0)
+    """Position [m]."""
+    rpy: tuple[Angle, Angle, Angle] | None = None
+    """Roll, pitch, yaw [rad] as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    quat_xyzw: Quaternion | None = None
+    """Rotation as a quaternion x, y, z, w; it is normalised."""
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> Self:
+        if self.rpy is not None and self.quat_xyzw is not None:
+            raise rejected("and rpy both give the rotation; keep one of the two", at=("quat_xyzw",))
+        return self
+
+
+class Pose(Placement):
+    """Where something stands in the frame of what carries it; the default is the same place."""
+
+
+Size2 = tuple[Size, Size]
+Size3 = tuple[Size, Size, Size]

@@ -1,0 +1,129 @@
+"""Links and the joints that carry them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from replay.scenario.fields import Axis, Name, Part, Pose, rejected
+from replay.scenario.shapes import Shape
+from replay.scenario.units import (
+    ANGLE,
+    LENGTH,
+    Angle,
+    Length,
+    MaxAcceleration,
+    MaxAngularAcceleration,
+    MaxAngularVelocity,
+    MaxVelocity,
+    Quantity,
+)
+
+AngleLimit = Annotated[float, Quantity("AngleLimit", ANGLE, infinite=True)]
+LengthLimit = Annotated[float, Quantity("LengthLimit", LENGTH, infinite=True)]
+
+
+class JointPart(Part):
+    """What all joints have in common."""
+
+    name: Name | None = None
+    """Unique among all joints; the link's name when left out."""
+
+
+class Fixed(JointPart):
+    """Does not move."""
+
+    type: Literal["fixed"]
+
+
+class Free(JointPart):
+    """Moves by the pose key frames of motion.free."""
+
+    type: Literal["free"]
+
+
+class Revolute(JointPart):
+    """Turns about an axis."""
+
+    type: Literal["revolute"]
+    axis: Axis = (0.0, 0.0, 1.0)
+    """Axis in the joint's frame; it is normalised."""
+    lower: AngleLimit = -math.inf
+    """Lower position limit [rad]."""
+    upper: AngleLimit = math.inf
+    """Upper position limit [rad]."""
+    velocity: MaxAngularVelocity = math.inf
+    """Limit of the absolute velocity [rad/s]; moves need one."""
+    acceleration: MaxAngularAcceleration = math.inf
+    """Limit of the absolute acceleration [rad/s^2]; moves need one."""
+    initial: Angle = 0.0
+    """Position [rad] while nothing has moved the joint."""
+
+    @model_validator(mode="after")
+    def _initial_within_limits(self) -> Self:
+        _check_limits(self, "rad")
+        return self
+
+
+class Continuous(JointPart):
+    """Turns about an axis without position limits."""
+
+    type: Literal["continuous"]
+    axis: Axis = (0.0, 0.0, 1.0)
+    """Axis in the joint's frame; it is normalised."""
+    velocity: MaxAngularVelocity = math.inf
+    """Limit of the absolute velocity [rad/s]; moves need one."""
+    acceleration: MaxAngularAcceleration = math.inf
+    """Limit of the absolute acceleration [rad/s^2]; moves need one."""
+    initial: Angle = 0.0
+    """Position [rad] while nothing has moved the joint."""
+
+
+class Prismatic(JointPart):
+    """Slides along an axis."""
+
+    type: Literal["prismatic"]
+    axis: Axis = (0.0, 0.0, 1.0)
+    """Axis in the joint's frame; it is normalised."""
+    lower: LengthLimit = -math.inf
+    """Lower position limit [m]."""
+    upper: LengthLimit = math.inf
+    """Upper position limit [m]."""
+    velocity: MaxVelocity = math.inf
+    """Limit of the absolute velocity [m/s]; moves need one."""
+    acceleration: MaxAcceleration = math.inf
+    """Limit of the absolute acceleration [m/s^2]; moves need one."""
+    initial: Length = 0.0
+    """Position [m] while nothing has moved the joint."""
+
+    @model_validator(mode="after")
+    def _initial_within_limits(self) -> Self:
+        _check_limits(self, "m")
+        return self
+
+
+def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
+    if joint.lower > joint.upper:
+        raise rejected(f"must not be above the upper limit {joint.upper:.6g} {unit}", at=("lower",))
+    if not joint.lower <= joint.initial <= joint.upper:
+        given = "" if "initial" in joint.model_fields_set else "(0 when left out) "
+        between = f"between the limits {joint.lower:.6g} {unit} and {joint.upper:.6g} {unit}"
+        raise rejected(f"{given}must be {between}", at=("initial",))
+
+
+Joint = Annotated[Fixed | Revolute | Continuous | Prismatic | Free, Field(discriminator="type")]
+
+
+class Link(Part):
+    """A rigid part: what it hangs on, how it moves against that, and the shapes it carries."""
+
+    parent: Name | None = None
+    """The link that carries this one; without it the link is the root of a tree and stands in the world."""
+    pose: Pose = Pose()
+    """Where the joint stands in the parent's frame (or in the world)."""
+    joint: Joint = Fixed(type="fixed")
+    """How the link moves in the joint's frame."""
+    shapes: dict[Name, Shape] = Field(default_factory=dict)
+    """Shapes by name."""

@@ -1,0 +1,91 @@
+"""The whole language: what a scenario file may hold."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, model_validator
+
+from replay.scenario.collision import Collision
+from replay.scenario.expectations import Expectation
+from replay.scenario.fields import Name, Part, Text, Title, rejected
+from replay.scenario.links import Link
+from replay.scenario.methods import Model, builtin_model
+from replay.scenario.motion import Motion
+from replay.scenario.sensors import Sensors
+from replay.scenario.source import Provenance
+from replay.scenario.units import Duration, Rate
+
+MAX_FRAMES: Final = 100_000_000
+
+Label = Annotated[str, StringConstraints(pattern=r"^[^\s,:/]+$", max_length=100)]
+
+
+class Fragment(Part):
+    """What an included file may hold."""
+
+    include: tuple[Annotated[str, StringConstraints(min_length=1)], ...] = ()
+    """Files whose parts are merged in; paths relative to this file, inside the scenario's folder tree."""
+    links: dict[Name, Link] = Field(default_factory=dict)
+    """Links by name."""
+    motion: Motion = Motion()
+    """What moves."""
+    collision: Collision = Collision()
+    """What is tested for collision."""
+    sensors: Sensors = Sensors()
+    """Sensors."""
+    model: Annotated[Model, BeforeValidator(builtin_model)] = Model()
+    """The version of each method, or the name of a built-in model."""
+    expect: tuple[Expectation, ...] = ()
+    """What must hold of the results."""
+
+
+class Scenario(Fragment):
+    """A scene, its scripted motion, its sensors, and what is computed of them."""
+
+    version: Literal[1]
+    """1, the version of this language."""
+    name: Title
+    """Names the recording."""
+    description: Text = ""
+    """What the scenario shows."""
+    tags: tuple[Label, ...] = ()
+    """Labels to select scenarios by."""
+    rate: Rate
+    """Frames per second [Hz]."""
+    duration: Duration
+    """Length [s]; frames are at k/rate for k = 0..floor(duration*rate)."""
+    _provenance: Provenance = PrivateAttr(default_factory=Provenance)
+
+    @model_validator(mode="after")
+    def _few_enough_frames(self) -> Self:
+        if self.frames > MAX_FRAMES:
+            raise rejected(f"makes {self.frames} frames; at most {MAX_FRAMES} are computed", at=("duration",))
+        return self
+
+    @property
+    def frames(self) -> int:
+        """Number of frames: floor(duration*rate) + 1, in exact arithmetic."""
+        return math.floor(Fraction(self.duration) * Fraction(self.rate)) + 1
+
+    @property
+    def sources(self) -> dict[str, bytes]:
+        """Every file the scenario needs, by its path relative to the scenario's folder, or package:// name."""
+        return self._provenance.sources
+
+    @property
+    def sha256(self) -> dict[str, str]:
+        """The SHA-256 of each source, in hexadecimal."""
+        return self._provenance.sha256
+
+    @property
+    def main_source(self) -> str:
+        """The name in `sources` of the scenario file itself."""
+        return self._provenance.main
+
+    @property
+    def provenance(self) -> Provenance:
+        """Where everything was read."""
+        return self._provenance

@@ -1,0 +1,77 @@
+"""Scripted motion as it is written."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from replay.scenario.fields import Flag, Name, Part, Placement, Vector, rejected
+from replay.scenario.units import JointAcceleration, JointPosition, JointVelocity, Share, Time
+
+SHORTEST = 1e-9
+"""Shortest time between two points [s]: the resolution of recordings, and it keeps polynomials finite."""
+
+
+class Waypoint(Part):
+    """What a joint passes at one time; an interval is linear, cubic or quintic, as far as both its ends go."""
+
+    time: Time
+    """[s] from the scenario's start."""
+    position: JointPosition
+    """[rad] or [m], by the joint's type."""
+    velocity: JointVelocity | None = None
+    """[rad/s] or [m/s]."""
+    acceleration: JointAcceleration | None = None
+    """[rad/s^2] or [m/s^2]; needs a velocity."""
+
+    @model_validator(mode="after")
+    def _acceleration_needs_velocity(self) -> Self:
+        if self.acceleration is not None and self.velocity is None:
+            raise rejected("needs a velocity beside it", at=("acceleration",))
+        return self
+
+
+class Move(Part):
+    """A move from rest to rest by a trapezoidal velocity profile."""
+
+    to: Annotated[dict[Name, JointPosition], Field(min_length=1)]
+    """Target position [rad or m] by joint name."""
+    start: Time | None = None
+    """[s]; when left out, the move starts as soon as the previous move of any of its joints has ended."""
+    speed: Share = 1.0
+    """Fraction of the joints' velocity and acceleration limits that is used."""
+    synchronised: Flag = True
+    """Whether all joints arrive together with the slowest."""
+
+
+class Keyframe(Placement):
+    """Pose of a free link in its joint's frame at one time; between key frames position is linear, rotation slerp."""
+
+    xyz: Vector
+    """Position [m]."""
+    time: Time
+    """[s] from the scenario's start."""
+
+
+def _increasing(items: tuple[Waypoint | Keyframe, ...]) -> tuple[Waypoint | Keyframe, ...]:
+    for index, (earlier, later) in enumerate(itertools.pairwise(items), start=1):
+        if not later.time - earlier.time >= SHORTEST:
+            raise rejected(f"must be above the one before, {earlier.time:.6g} s, by 1 ns or more", at=(index, "time"))
+    return items
+
+
+Waypoints = Annotated[tuple[Waypoint, ...], Field(min_length=1), AfterValidator(_increasing)]
+Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_increasing)]
+
+
+class Motion(Part):
+    """What moves; all other joints hold their initial position."""
+
+    points: dict[Name, Waypoints] = Field(default_factory=dict)
+    """Waypoints by joint name."""
+    moves: tuple[Move, ...] = ()
+    """Moves, planned in this order."""
+    free: dict[Name, Keyframes] = Field(default_factory=dict)
+    """Pose key frames by the name of a free joint."""

@@ -1,0 +1,197 @@
+"""What a scenario's text names, and the entries of it that are valid: references between entries are checked even while
+other entries are wrong, so that all problems are listed at once.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+from pydantic import TypeAdapter, ValidationError
+
+from replay.scenario.collision import Disable
+from replay.scenario.expectations import CapacitiveExpectation, DistanceExpectation, Expectation, PairExpectation
+from replay.scenario.fields import Part
+from replay.scenario.links import Continuous, Joint, Prismatic, Revolute
+from replay.scenario.methods import Model, builtin_model
+from replay.scenario.model import Scenario
+from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoints
+from replay.scenario.node import Node
+from replay.scenario.sensors import CapacitiveSensor, DistanceSensor
+from replay.scenario.source import find
+from replay.scenario.units import Distance
+
+SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
+
+
+def matches(pattern: str, link: str, shape: str | None = None) -> bool:
+    """Return whether a pattern matches a link's name or, with a shape, "link/shape"."""
+    return fnmatch.fnmatchcase(link, pattern) or (shape is not None and fnmatch.fnmatchcase(f"{link}/{shape}", pattern))
+
+
+@dataclass(frozen=True)
+class JointName:
+    """The joint of a link, as far as its text can be read.
+
+    Attributes:
+        type: None where it cannot be read.
+        scalar: the joint itself, if it is a valid one with one position.
+    """
+
+    name: str
+    link: str
+    type: str | None
+    scalar: Revolute | Continuous | Prismatic | None
+
+
+@dataclass(frozen=True)
+class ShapeName:
+    """A shape by its name."""
+
+    link: str
+    name: str
+    collides: bool
+
+    @property
+    def full(self) -> str:
+        """The name "link/shape"."""
+        return f"{self.link}/{self.name}"
+
+
+class Names:
+    """All names of a scenario, and its valid entries; an entry that is not valid is None.
+
+    Args:
+        root: the text's tree.
+        scenario: the same as validated, or None when anything in it is wrong.
+    """
+
+    def __init__(self, root: Node, scenario: Scenario | None) -> None:
+        self.root = root
+        self._scenario = scenario
+
+    @cached_property
+    def parents(self) -> dict[str, str | None]:
+        """Parent by link; None for a root, or where it cannot be read."""
+        return {link: _text(node.child("parent")) for link, node in self._map("links").items()}
+
+    @cached_property
+    def joints(self) -> tuple[JointName, ...]:
+        """The joint of each link."""
+        return tuple(self._joint(link, node) for link, node in self._map("links").items())
+
+    def _joint(self, link: str, node: Node) -> JointName:
+        joint = node.child("joint")
+        if joint is None:
+            return JointName(link, link, "fixed", None)
+        valid = self._entry(Joint, "links", link, "joint")
+        scalar = valid if isinstance(valid, Revolute | Continuous | Prismatic) else None
+        return JointName(_text(joint.child("name")) or link, link, _text(joint.child("type")), scalar)
+
+    @cached_property
+    def shapes(self) -> tuple[ShapeName, ...]:
+        """All shapes."""
+        found = []
+        for link in self.parents:
+            for name, node in self._map("links", link, "shapes").items():
+                collide = node.child("collide")
+                found.append(ShapeName(link, name, collide is None or collide.value is not False))
+        return tuple(found)
+
+    def links_matching(self, pattern: str) -> list[str]:
+        """Return the links that a pattern matches."""
+        return [link for link in self.parents if matches(pattern, link)]
+
+    def shapes_matching(self, pattern: str) -> list[ShapeName]:
+        """Return the shapes that a pattern matches, by link or by full name."""
+        return [shape for shape in self.shapes if matches(pattern, shape.link, shape.name)]
+
+    @cached_property
+    def points(self) -> dict[str, tuple[Waypoint, ...] | None]:
+        """Waypoints by joint."""
+        return {name: self._entry(Waypoints, "motion", "points", name) for name in self._map("motion", "points")}
+
+    @cached_property
+    def moves(self) -> list[Move | None]:
+        """Moves in order."""
+        return [self._entry(Move, "motion", "moves", index) for index in self._list("motion", "moves")]
+
+    @cached_property
+    def free(self) -> dict[str, tuple[Keyframe, ...] | None]:
+        """Key frames by joint."""
+        return {name: self._entry(Keyframes, "motion", "free", name) for name in self._map("motion", "free")}
+
+    @cached_property
+    def distance(self) -> dict[str, DistanceSensor | None]:
+        """Distance sensors by name."""
+        names = self._map("sensors", "distance")
+        return {name: self._entry(DistanceSensor, "sensors", "distance", name) for name in names}
+
+    @cached_property
+    def capacitive(self) -> dict[str, CapacitiveSensor | None]:
+        """Capacitive sensors by name."""
+        names = self._map("sensors", "capacitive")
+        return {name: self._entry(CapacitiveSensor, "sensors", "capacitive", name) for name in names}
+
+    @cached_property
+    def disable(self) -> list[Disable | None]:
+        """Disabled pairs in order."""
+        return [self._entry(Disable, "collision", "disable", index) for index in self._list("collision", "disable")]
+
+    @cached_property
+    def expect(self) -> list[PairExpectation | DistanceExpectation | CapacitiveExpectation | None]:
+        """Expectations in order."""
+        return [self._entry(Expectation, "expect", index) for index in self._list("expect")]
+
+    @property
+    def tests_pairs(self) -> bool:
+        """Whether pairs are tested at all."""
+        return _text(find(self.root, ("collision", "pairs"))) != "none"
+
+    @cached_property
+    def margin(self) -> float | None:
+        """collision.margin [m]."""
+        if find(self.root, ("collision", "margin")) is None:
+            return 0.05
+        result: float | None = self._entry(Distance, "collision", "margin")
+        return result
+
+    @cached_property
+    def model(self) -> Model | None:
+        """The model, or None when it is not valid."""
+        node = self.root.child("model")
+        if node is None:
+            return Model()
+        if self._scenario is not None:
+            return self._scenario.model
+        try:
+            return Model.model_validate(builtin_model(node.data()))
+        except ValueError:
+            return None
+
+    def _map(self, *path: str) -> dict[str, Node]:
+        node = find(self.root, path)
+        return {} if node is None else node.mapping
+
+    def _list(self, *path: str) -> range:
+        node = find(self.root, path)
+        return range(0 if node is None else len(node.sequence))
+
+    def _entry(self, annotation: Any, *path: str | int) -> Any:
+        if self._scenario is not None:
+            value: Any = self._scenario
+            for step in path:
+                value = getattr(value, step) if isinstance(value, Part) and isinstance(step, str) else value[step]
+            return value
+        node = find(self.root, path)
+        assert node is not None
+        try:
+            return TypeAdapter(annotation).validate_python(node.data())
+        except ValidationError:
+            return None
+
+
+def _text(node: Node | None) -> str | None:
+    return node.value if node is not None and isinstance(node.value, str) else None

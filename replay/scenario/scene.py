@@ -1,0 +1,276 @@
+"""A scenario as arrays, ready to be simulated: everything that is constant over its frames is computed here, once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision.pairs import CollisionBody, DisabledPair, Pair, plan_pairs
+from replay.errors import MeshError, Problem, ScenarioError
+from replay.geometry import primitives
+from replay.geometry.mesh import load_mesh
+from replay.geometry.solid import Solid
+from replay.kinematics.linkage import Linkage
+from replay.kinematics.motion import Script
+from replay.scenario import frames, shapes
+from replay.scenario.expectations import PairExpectation
+from replay.scenario.layout import Layout
+from replay.scenario.methods import Model
+from replay.scenario.model import Scenario
+from replay.scenario.names import matches
+from replay.scenario.script import linkage, script, transform
+from replay.scenario.verdict import ExpectationCheck, matching_pairs
+from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
+from replay.sensing.distance import DistanceSensor
+from replay.sensing.target import Target, make_target
+
+Color = tuple[int, int, int, int]
+"""Red, green, blue and opacity, 0 to 255."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneShape:
+    """A shape on its link.
+
+    Attributes:
+        name: "link/shape".
+        link: index of its link.
+        solid: in the link's frame.
+        color: in recordings.
+        collides, sensed: whether it takes part in collision detection, and whether sensors sense it.
+    """
+
+    name: str
+    link: int
+    solid: Solid
+    color: Color
+    collides: bool
+    sensed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a scenario simulates.
+
+    Attributes:
+        scenario: where it comes from.
+        model: the version of each method: the scenario's own, or the one that replaces it.
+        linkage, script: links, joints, and how they move.
+        shapes: all shapes, sorted by name.
+        bodies, pairs: what is tested for collision; no bodies when no pair is.
+        targets: what sensors sense, sorted by name; none when there are no sensors.
+        distance_sensors, capacitive_sensors: sorted by name.
+        layout: the names behind the columns of results.
+        notes: what a reader should know about the meshes, one line each.
+    """
+
+    scenario: Scenario
+    model: Model
+    linkage: Linkage
+    script: Script
+    shapes: tuple[SceneShape, ...]
+    bodies: tuple[CollisionBody, ...]
+    pairs: tuple[Pair, ...]
+    targets: tuple[Target, ...]
+    distance_sensors: tuple[DistanceSensor, ...]
+    capacitive_sensors: tuple[CapacitiveSensor, ...]
+    layout: Layout
+    notes: tuple[str, ...]
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return self.scenario.frames
+
+    @property
+    def margin(self) -> float:
+        """Clearances up to this one are computed [m] when the model says near."""
+        return self.scenario.collision.margin
+
+    def time_ns(self, begin: int, end: int) -> NDArray[np.int64]:
+        """Return the times (end - begin,) [ns] of frames begin..end-1."""
+        return frames.time_ns(Fraction(self.scenario.rate), begin, end)
+
+    def seconds(self, begin: int, end: int) -> NDArray[np.float64]:
+        """Return the times (end - begin,) [s] of frames begin..end-1."""
+        return frames.seconds(Fraction(self.scenario.rate), begin, end)
+
+    def expectation_check(self) -> ExpectationCheck:
+        """Return what follows the scenario's expectations over all frames."""
+        return ExpectationCheck(
+            self.scenario.expect,
+            self.layout,
+            clearance=self.model.collision.clearance,
+            margin=self.margin,
+            provenance=self.scenario.provenance,
+        )
+
+
+def build(scenario: Scenario, *, model: Model | None = None) -> Scene:
+    """Return the scene of a scenario.
+
+    Args:
+        scenario: as loaded.
+        model: replaces the scenario's own model.
+
+    Raises:
+        ScenarioError: a mesh cannot be used, a shape needs too many triangles, or an expectation is about a pair that
+            is not tested; each with its place.
+    """
+    model = model or scenario.model
+    machine = linkage(scenario)
+    scene_shapes, notes = _shapes(scenario, machine)
+    bodies, pairs = _collision(scenario, machine, scene_shapes)
+    sensors = scenario.sensors
+    distance = tuple(_distance_sensor(scenario, machine, name) for name in sorted(sensors.distance))
+    capacitive = tuple(_capacitive_sensor(scenario, machine, name) for name in sorted(sensors.capacitive))
+    sensed = [shape for shape in scene_shapes if shape.sensed] if distance or capacitive else []
+    targets = tuple(make_target(shape.name, shape.link, shape.solid.triangles) for shape in sensed)
+    names = tuple(target.name for target in targets)
+    layout = Layout(
+        links=machine.link_names,
+        joints=machine.joint_names,
+        joint_units=tuple(joint.type.unit for joint in machine.joints),
+        shapes=names,
+        pairs=tuple(pair.name for pair in pairs),
+        distance_sensors=tuple(sensor.name for sensor in distance),
+        capacitive_sensors=tuple(sensor.name for sensor in capacitive),
+        objects=names if capacitive else (),
+    )
+    _check_expectations(scenario, layout)
+    return Scene(
+        scenario=scenario,
+        model=model,
+        linkage=machine,
+        script=script(scenario),
+        shapes=scene_shapes,
+        bodies=bodies,
+        pairs=pairs,
+        targets=targets,
+        distance_sensors=distance,
+        capacitive_sensors=capacitive,
+        layout=layout,
+        notes=notes,
+    )
+
+
+def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...], tuple[str, ...]]:
+    """Return all shapes sorted by name, and the notes on meshes; a mesh file is read once for each scale."""
+    meshes: dict[tuple[str, float], Solid] = {}
+    notes: dict[str, None] = {}
+    problems: list[Problem] = []
+    found = []
+
+    def mesh(link: str, name: str, shape: shapes.Mesh) -> Solid:
+        file = scenario.provenance.meshes.get((link, name))
+        if file is None:
+            raise MeshError(shape.file, "is not at hand: scenarios with meshes come from `load` or `load_sources`")
+        if (file, shape.scale) not in meshes:
+            meshes[file, shape.scale] = load_mesh(file, scale=shape.scale, data=scenario.sources[file])
+        solid = meshes[file, shape.scale]
+        notes.update(dict.fromkeys(f"{file}: {note}" for note in solid.notes))
+        return solid
+
+    for link, entry in scenario.links.items():
+        for name, shape in entry.shapes.items():
+            try:
+                solid = mesh(link, name, shape) if isinstance(shape, shapes.Mesh) else _primitive(shape)
+            except MeshError as error:
+                path = ("links", link, "shapes", name, "file")
+                problems.append(scenario.provenance.problem(path, f"cannot be used: {error.reason}"))
+                continue
+            placed = solid.transformed(transform(shape.pose))
+            index = machine.link_index(link)
+            color = _color(shape.color)
+            found.append(SceneShape(f"{link}/{name}", index, placed, color, shape.collide, shape.sense))
+    if problems:
+        raise ScenarioError(problems)
+    return tuple(sorted(found, key=lambda shape: shape.name)), tuple(notes)
+
+
+def _primitive(shape: shapes.ShapePart) -> Solid:
+    """Return a shape that is no mesh, in its own frame."""
+    match shape:
+        case shapes.Cube():
+            return primitives.cube(shape.size)
+        case shapes.Cuboid():
+            return primitives.cuboid(shape.size)
+        case shapes.Plane():
+            return primitives.plane(shape.size)
+        case shapes.Sphere():
+            return primitives.sphere(shape.radius, shape.chord_error)
+        case shapes.Cylinder():
+            return primitives.cylinder(shape.radius, shape.height, shape.chord_error)
+        case shapes.Cone():
+            return primitives.cone(shape.radius, shape.height, shape.chord_error)
+        case shapes.Arc():
+            return primitives.arc(shape.radius, shape.span, shape.width, shape.thickness, shape.chord_error)
+        case _:
+            raise AssertionError(f"{type(shape).__name__} is no primitive shape")
+
+
+def _color(text: str) -> Color:
+    red, green, blue, *opacity = (int(text[k : k + 2], 16) for k in range(1, len(text), 2))
+    return red, green, blue, opacity[0] if opacity else 255
+
+
+def _collision(
+    scenario: Scenario, machine: Linkage, scene_shapes: Sequence[SceneShape]
+) -> tuple[tuple[CollisionBody, ...], tuple[Pair, ...]]:
+    if scenario.collision.pairs == "none":
+        return (), ()
+    bodies = tuple(CollisionBody(shape.name, shape.link, shape.solid) for shape in scene_shapes if shape.collides)
+    disabled = [DisabledPair(entry.pair[0], entry.pair[1], entry.reason) for entry in scenario.collision.disable]
+    return bodies, plan_pairs(bodies, machine, disabled=disabled)
+
+
+def _ignored(machine: Linkage, patterns: Sequence[str]) -> frozenset[int]:
+    return frozenset(
+        index for index, name in enumerate(machine.link_names) if any(matches(pattern, name) for pattern in patterns)
+    )
+
+
+def _distance_sensor(scenario: Scenario, machine: Linkage, name: str) -> DistanceSensor:
+    written = scenario.sensors.distance[name]
+    return DistanceSensor(
+        name=name,
+        link=machine.link_index(written.link),
+        T_link_sensor=transform(written.pose),
+        aperture=written.aperture,
+        range=written.range,
+        min_range=written.min_range,
+        ignored_links=_ignored(machine, written.ignore),
+    )
+
+
+def _capacitive_sensor(scenario: Scenario, machine: Linkage, name: str) -> CapacitiveSensor:
+    written = scenario.sensors.capacitive[name]
+    plates = tuple(
+        Plate(name=plate, T_link_plate=transform(part.pose), half_size=0.5 * np.array(part.size))
+        for plate, part in sorted(written.plates.items())
+    )
+    return CapacitiveSensor(
+        name=name,
+        link=machine.link_index(written.link),
+        plates=plates,
+        coupling=written.coupling,
+        permittivity=written.permittivity,
+        supply=written.supply,
+        side=written.side,
+        faces=written.faces,
+        ignored_links=_ignored(machine, written.ignore),
+    )
+
+
+def _check_expectations(scenario: Scenario, layout: Layout) -> None:
+    problems = [
+        scenario.provenance.problem(("expect", index, "pair"), f"{list(entry.pair)} matches no pair that is tested")
+        for index, entry in enumerate(scenario.expect)
+        if isinstance(entry, PairExpectation) and not len(matching_pairs(layout.pairs, entry.pair))
+    ]
+    if problems:
+        raise ScenarioError(problems)

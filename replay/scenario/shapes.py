@@ -1,0 +1,122 @@
+"""The shapes that links carry."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from replay.scenario.fields import Flag, Part, Pose, Size2, Size3, rejected
+from replay.scenario.units import Aperture, Scale, Size
+
+FINEST_CHORD = 1e-5
+"""Smallest chord error as a fraction of the radius: a sphere then has about 0.6 million triangles."""
+
+Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}([0-9a-fA-F]{2})?$")]
+
+
+class ShapePart(Part):
+    """What all shapes have in common."""
+
+    pose: Pose = Pose()
+    """Where the shape stands in its link's frame."""
+    color: Color = "#b0b4bc"
+    """Colour in recordings: "#rrggbb" or "#rrggbbaa"."""
+    collide: Flag = True
+    """Whether the shape takes part in collision detection."""
+    sense: Flag = True
+    """Whether sensors sense the shape."""
+
+
+class Cube(ShapePart):
+    """A cube centred at its origin."""
+
+    type: Literal["cube"]
+    size: Size
+    """Edge length [m]."""
+
+
+class Cuboid(ShapePart):
+    """A box centred at its origin."""
+
+    type: Literal["cuboid"]
+    size: Size3
+    """Edge lengths along x, y and z [m]."""
+
+
+class Plane(ShapePart):
+    """A rectangle in its xy plane, centred at its origin, facing +z."""
+
+    type: Literal["plane"]
+    size: Size2
+    """Edge lengths along x and y [m]."""
+
+
+class Curved(ShapePart):
+    """What all tessellated shapes have in common."""
+
+    radius: Size
+    """Radius [m]."""
+    chord_error: Size = 0.001
+    """Largest distance between the true surface and its triangles [m]."""
+
+    @model_validator(mode="after")
+    def _sensible_chord_error(self) -> Self:
+        finest = FINEST_CHORD * self.radius
+        if self.chord_error < finest:
+            given = "" if "chord_error" in self.model_fields_set else f"({self.chord_error:.6g} m when left out) "
+            raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
+        return self
+
+
+class Sphere(Curved):
+    """A sphere around its origin."""
+
+    type: Literal["sphere"]
+
+
+class Cylinder(Curved):
+    """A cylinder along z, its origin at half height."""
+
+    type: Literal["cylinder"]
+    height: Size
+    """Height [m]."""
+
+
+class Cone(Curved):
+    """A cone along z with its apex at +z, its origin at half height."""
+
+    type: Literal["cone"]
+    height: Size
+    """Height [m]."""
+
+
+class Arc(Curved):
+    """A bent bar in the xy plane, symmetric about +x: the C of a C-arm."""
+
+    type: Literal["arc"]
+    span: Aperture
+    """Angle that the arc covers [rad], at most a full turn."""
+    width: Size
+    """Width along z [m]."""
+    thickness: Size
+    """Radial thickness [m]; the radius is that of the mid-line."""
+
+    @model_validator(mode="after")
+    def _thinner_than_its_radius(self) -> Self:
+        if self.thickness >= 2.0 * self.radius:
+            raise rejected(f"must be below twice the radius, {2.0 * self.radius:.6g} m", at=("thickness",))
+        return self
+
+
+class Mesh(ShapePart):
+    """The triangles of a file."""
+
+    type: Literal["mesh"]
+    file: Annotated[str, StringConstraints(min_length=1, max_length=1000)]
+    """Path relative to the file that names it, inside the scenario's folder tree, or package://PYTHON_PACKAGE/path."""
+    scale: Scale
+    """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres."""
+
+
+Shape = Annotated[Cube | Cuboid | Sphere | Cylinder | Cone | Plane | Arc | Mesh, Field(discriminator="type")]

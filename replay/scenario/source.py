@@ -1,0 +1,232 @@
+"""Where the files of a scenario come from: a folder tree and installed packages, or a recording's attachments.
+
+Every file has a name: its path relative to the scenario's folder with "/", or `package://PYTHON_PACKAGE/path`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import posixpath
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Final, Protocol
+
+from replay.errors import Problem
+from replay.scenario.node import Node, Place
+
+PACKAGE: Final = "package://"
+MAX_FILE_BYTES: Final = 1 << 30
+
+_INSTALL: Final = {"pyskindose": "pip install --no-deps pyskindose"}
+"""How to get a package when `pip install NAME` is not the best way."""
+
+
+class SourceRule(Exception):
+    """A file cannot be used; the text goes on after the file's name in a message."""
+
+
+class Library(Protocol):
+    """Files by name."""
+
+    main: str
+
+    def shown(self, name: str) -> str:
+        """Return what messages call the file of this name."""
+
+    def read(self, name: str) -> bytes:
+        """Return the file's bytes; raises SourceRule."""
+
+
+@dataclass
+class Provenance:
+    """Where a scenario was read from.
+
+    Attributes:
+        main: name of the scenario file itself.
+        sources: every file the scenario needs, by name.
+        meshes: name of the mesh file of each mesh shape, by (link, shape).
+        root: the text's tree, includes merged.
+    """
+
+    main: str = ""
+    sources: dict[str, bytes] = field(default_factory=dict)
+    meshes: dict[tuple[str, str], str] = field(default_factory=dict)
+    root: Node | None = field(default=None, compare=False)
+
+    @cached_property
+    def sha256(self) -> dict[str, str]:
+        """The SHA-256 of each source, in hexadecimal."""
+        return {name: hashlib.sha256(data).hexdigest() for name, data in sorted(self.sources.items())}
+
+    def place(self, path: tuple[str | int, ...]) -> Place | None:
+        """Return where a path of the language is written; None for a scenario that was not read from text."""
+        return None if self.root is None else locate(self.root, path)
+
+    def problem(self, path: tuple[str | int, ...], rule: str) -> Problem:
+        """Return what is wrong with the value at a path, with its place."""
+        if self.root is None:
+            return Problem(f"{dotted(path)} {rule}")
+        return problem_at(self.root, path, rule)
+
+
+def locate(root: Node, path: tuple[str | int, ...]) -> Place:
+    """Return where the value at a path is written: a scalar itself, a collection's key; or what comes nearest above."""
+    node, place = root, root.place
+    for step in path:
+        below = node.child(step)
+        if below is None:
+            break
+        collection = isinstance(below.value, dict | list)
+        place = node.keys[step] if collection and isinstance(step, str) else below.place
+        node = below
+    return place
+
+
+def find(root: Node, path: tuple[str | int, ...]) -> Node | None:
+    """Return the node at a path, or None."""
+    node: Node | None = root
+    for step in path:
+        node = None if node is None else node.child(step)
+    return node
+
+
+def problem_at(root: Node, path: tuple[str | int, ...], rule: str) -> Problem:
+    """Return `path = value rule` with its place."""
+    node = find(root, path)
+    scalar = node is not None and not isinstance(node.value, dict | list)
+    value = f" = {node.shown()}" if node is not None and scalar else ""
+    name = dotted(path)
+    return locate(root, path).problem(f"{name}{value} {rule}" if name else rule)
+
+
+def dotted(path: tuple[str | int, ...]) -> str:
+    """Return a path as people write it: `links.arm.shapes.box.size[2]`."""
+    text = ""
+    for step in path:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            shown = (
+                step if re.fullmatch(r"[\w.\-]{1,100}", step) else repr(step if len(step) <= 60 else f"{step[:60]}...")
+            )
+            text += f".{shown}" if text else shown
+    return text
+
+
+def resolve_name(written: str, base: str) -> str:
+    """Return the name of a file as written in the file named `base`.
+
+    Raises:
+        SourceRule: the path leaves the scenario's folder tree, or is not a relative path with "/".
+    """
+    if written.startswith(PACKAGE):
+        package, _, path = written.removeprefix(PACKAGE).partition("/")
+        steps = path.split("/")
+        if not package.isidentifier() or any(step in ("", ".", "..") for step in steps) or "\\" in path:
+            raise SourceRule("is not of the form package://PYTHON_PACKAGE/path/inside/it")
+        return written
+    if "://" in written:
+        raise SourceRule("is a URL; write a path inside the scenario's folder, or package://PYTHON_PACKAGE/path")
+    if "\\" in written or "\0" in written:
+        raise SourceRule("is not a path that works everywhere; write / between folders")
+    if written.startswith("/") or re.match(r"[A-Za-z]:", written):
+        raise SourceRule("is an absolute path; write one relative to the file that names it")
+    if base.startswith(PACKAGE):
+        raise SourceRule("is named inside a package; only the scenario's own files may name files")
+    name = posixpath.normpath(posixpath.join(posixpath.dirname(base), written))
+    if name.split("/")[0] == "..":
+        raise SourceRule("leads out of the scenario's folder; keep its files in that folder, or below it")
+    return name
+
+
+class Folder:
+    """The folder tree of a scenario file, and installed packages."""
+
+    def __init__(self, path: Path) -> None:
+        self.main = path.name
+        self.folder = path.parent
+
+    def shown(self, name: str) -> str:
+        """Return the path as given by the user, or the package:// name."""
+        return name if name.startswith(PACKAGE) else (self.folder / name).as_posix()
+
+    def read(self, name: str) -> bytes:
+        """Return the file's bytes; a link that leads out of the folder tree is refused."""
+        if name.startswith(PACKAGE):
+            return _read(_in_package(name))
+        path = self.folder / name
+        if name != self.main and not path.resolve().is_relative_to(self.folder.resolve()):
+            raise SourceRule("is a link that leads out of the scenario's folder; copy the file there")
+        return _read(path)
+
+
+class Attached:
+    """Files held in memory, as attached to a recording."""
+
+    def __init__(self, main: str, sources: Mapping[str, bytes]) -> None:
+        self.main = main
+        self._sources = sources
+
+    def shown(self, name: str) -> str:
+        """Return the name itself."""
+        return name
+
+    def read(self, name: str) -> bytes:
+        """Return the attachment's bytes."""
+        if name not in self._sources:
+            raise SourceRule(f"is not attached; attached are {', '.join(sorted(self._sources)) or 'no files'}")
+        return self._sources[name]
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise SourceRule("is a folder; name a file")
+        if path.exists() and not path.is_file():
+            raise SourceRule("is not a regular file")
+        size = path.stat().st_size
+        if size > MAX_FILE_BYTES:
+            raise SourceRule(f"has {size} bytes; at most {MAX_FILE_BYTES} are read")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise SourceRule(f"does not exist{_similar(path)}") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise SourceRule(f"cannot be read: {reason}") from None
+
+
+def _similar(path: Path) -> str:
+    import difflib
+
+    try:
+        names = sorted(entry.name for entry in path.parent.iterdir())
+    except OSError:
+        return f"; there is no folder {path.parent.as_posix()}"
+    close = difflib.get_close_matches(path.name, names, n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _in_package(name: str) -> Path:
+    """Return the path of a file of an installed package, found without importing the package."""
+    package, _, path = name.removeprefix(PACKAGE).partition("/")
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        install = _INSTALL.get(package, f"pip install {package}")
+        raise SourceRule(f"needs the Python package {package!r}, which is not installed; get it with: {install}")
+    folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
+    for folder in folders:
+        file = folder / path
+        if file.exists():
+            if not file.resolve().is_relative_to(folder.resolve()):
+                raise SourceRule(f"is a link that leads out of the package {package!r}")
+            return file
+    if not folders:
+        raise SourceRule(f"names {package!r}, which is a single module without files")
+    raise SourceRule(f"does not exist in the package {package!r}{_similar(folders[0] / path)}")

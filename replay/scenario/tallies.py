@@ -1,0 +1,127 @@
+"""What is kept of a quantity while its frames stream past, and what it says in the end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.scenario.expectations import When
+
+Times = NDArray[np.int64]
+Values = NDArray[np.float64]
+
+
+class Tally(Protocol):
+    """Takes a quantity's values frame by frame and judges them in the end."""
+
+    def update(self, time_ns: Times, values: Values) -> None:
+        """Take the values (n,) of n frames at times (n,) [ns]; a NaN is no value."""
+
+    def result(self, what: str) -> tuple[bool, str]:
+        """Return whether the expectation held, and the detail."""
+
+
+@dataclass
+class Count:
+    """In how many frames something was so (1) or not (0)."""
+
+    when: When
+    count: int = 0
+    frames: int = 0
+    first: int | None = None
+    first_not: int | None = None
+
+    def update(self, time_ns: Times, values: Values) -> None:
+        """See `Tally`."""
+        so = values > 0.0
+        self.count += int(np.count_nonzero(so))
+        self.frames += len(so)
+        if self.first is None and so.any():
+            self.first = int(time_ns[int(np.argmax(so))])
+        if self.first_not is None and not so.all():
+            self.first_not = int(time_ns[int(np.argmin(so))])
+
+    def result(self, what: str) -> tuple[bool, str]:
+        """See `Tally`."""
+        text = f"{what} in {self.count} of {self.frames} frames"
+        if self.when == "always":
+            text += "" if self.first_not is None else f", first not at {shown_seconds(self.first_not)}"
+            return self.count == self.frames, text
+        text += "" if self.first is None else f", first at {shown_seconds(self.first)}"
+        return (self.count == 0) == (self.when == "never"), text
+
+
+@dataclass
+class Begin:
+    """The first frame in which something was so (1), and the window [ns] it is expected in."""
+
+    window: tuple[int, int]
+    first: int | None = None
+
+    def update(self, time_ns: Times, values: Values) -> None:
+        """See `Tally`."""
+        so = values > 0.0
+        if self.first is None and so.any():
+            self.first = int(time_ns[int(np.argmax(so))])
+
+    def result(self, what: str) -> tuple[bool, str]:
+        """See `Tally`."""
+        if self.first is None:
+            return False, f"{what} in no frame"
+        return self.window[0] <= self.first <= self.window[1], f"{what} begins at {shown_seconds(self.first)}"
+
+
+@dataclass
+class Extremes:
+    """Smallest and largest value, their times, and the bounds expected of them; NaN is no value.
+
+    Attributes:
+        complete: every frame must have a value.
+    """
+
+    unit: str
+    low: float | None = None
+    high: float | None = None
+    complete: bool = False
+    least: tuple[float, int] = (math.inf, 0)
+    most: tuple[float, int] = (-math.inf, 0)
+    missing: int = 0
+
+    def update(self, time_ns: Times, values: Values) -> None:
+        """See `Tally`."""
+        known = ~np.isnan(values)
+        self.missing += len(values) - int(np.count_nonzero(known))
+        values, time_ns = values[known], time_ns[known]
+        if not len(values):
+            return
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        if values[low] < self.least[0]:
+            self.least = (float(values[low]), int(time_ns[low]))
+        if values[high] > self.most[0]:
+            self.most = (float(values[high]), int(time_ns[high]))
+
+    def result(self, what: str) -> tuple[bool, str]:
+        """See `Tally`."""
+        parts = []
+        found = self.most[0] >= self.least[0]
+        if found and self.low is not None:
+            parts.append(f"smallest {what} {self.least[0]:.6g} {self.unit} at {shown_seconds(self.least[1])}")
+        if found and self.high is not None:
+            parts.append(f"largest {what} {self.most[0]:.6g} {self.unit} at {shown_seconds(self.most[1])}")
+        if not found:
+            parts.append(f"no {what}")
+        unknown = self.complete and self.missing > 0
+        if unknown:
+            parts.append(f"{what} not computed in {self.missing} frames (model.collision.clearance)")
+        above = self.low is None or self.least[0] >= self.low
+        below = self.high is None or self.most[0] <= self.high
+        return above and below and not unknown, ", ".join(parts)
+
+
+def shown_seconds(time_ns: int) -> str:
+    """Return a time [ns] for a message."""
+    return f"{time_ns * 1e-9:.6g} s"

@@ -1,0 +1,262 @@
+"""YAML 1.2 text to a tree of nodes that know their place: line and column of every key and value.
+
+The events come from ruamel.yaml's scanner; what a plain scalar means is decided here, by the core schema of YAML 1.2
+(section 10.3.2): `1e-6` is a number, and `on`, `no`, `12:30` and `1_000` are text.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, Final
+
+from replay.errors import Problem
+from replay.scenario.node import Node, Place, Scalar
+
+__all__ = ["MAX_BYTES", "MAX_DEPTH", "MAX_DIGITS", "MAX_NODES", "Node", "parse"]
+
+MAX_BYTES: Final = 4 << 20
+"""Scenario text is written by people; 4 MiB is read in about 20 s, and more is a mistake."""
+
+MAX_DEPTH: Final = 40
+"""Nested collections; the language itself needs 8."""
+
+MAX_NODES: Final = 200_000
+"""Nodes after every alias is written out, which stops a few lines of aliases from becoming gigabytes."""
+
+MAX_DIGITS: Final = 400
+"""Characters of one number."""
+
+_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_INFINITY = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
+_NOT_A_NUMBER = (".nan", ".NaN", ".NAN")
+_NULL = ("", "~", "null", "Null", "NULL")
+_TRUE = ("true", "True", "TRUE")
+_FALSE = ("false", "False", "FALSE")
+_TAG = "tag:yaml.org,2002:"
+
+
+class _Rejected(Exception):
+    """The text cannot be read any further."""
+
+
+def parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
+    """Read one YAML document.
+
+    Args:
+        data: the file's bytes, UTF-8.
+        file: the name that places carry.
+        problems: what is wrong is appended here: everything that still lets the rest be read, or the one that does not.
+
+    Returns:
+        The root node, or None when the text is not YAML or empty.
+    """
+    if len(data) > MAX_BYTES:
+        problems.append(Problem(f"the file has {len(data)} bytes; at most {MAX_BYTES} are read", file=file))
+        return None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        column = error.start - data.rfind(b"\n", 0, error.start)
+        found = f"byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        problems.append(Problem(found, file=file, line=line, column=column))
+        return None
+    try:
+        return _Builder(file, problems).build(text)
+    except _Rejected:
+        return None
+
+
+def _events(text: str, file: str, problems: list[Problem]) -> Iterator[Any]:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError
+    from ruamel.yaml.reader import ReaderError
+
+    line = column = 1
+    try:
+        for event in YAML(typ="safe", pure=True).parse(text):
+            line, column = event.end_mark.line + 1, event.end_mark.column + 1
+            yield event
+    except ReaderError as error:
+        found = f"character U+{int(error.character):04X} is not allowed in YAML; remove it"
+        before = text[: text.find(chr(error.character))]
+        line = before.count("\n") + 1
+        problems.append(Problem(found, file=file, line=line, column=len(before) - before.rfind("\n")))
+        raise _Rejected from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        message = " ".join(str(error.problem or error.context).split())
+        if "\\t" in message:
+            message = "a tab cannot indent YAML; use spaces"
+        elif error.context and error.context_mark is not None:
+            begun = f"{error.context_mark.line + 1}:{error.context_mark.column + 1}"
+            message = f"{message} ({error.context} that starts at {begun})"
+        place = {} if mark is None else {"line": mark.line + 1, "column": mark.column + 1}
+        problems.append(Problem(f"not YAML: {message}", file=file, **place))
+        raise _Rejected from None
+    except Exception as error:  # the scanner lets a bad escape or directive out as whatever Python raised
+        problems.append(Problem(f"not YAML after this: {error}", file=file, line=line, column=column))
+        raise _Rejected from None
+
+
+class _Builder:
+    def __init__(self, file: str, problems: list[Problem]) -> None:
+        self.file = file
+        self.problems = problems
+        self.anchors: dict[str, Node | None] = {}
+        self.nodes = 0
+
+    def build(self, text: str) -> Node | None:
+        self.events = _events(text, self.file, self.problems)
+        root: Node | None = None
+        documents = 0
+        for event in self.events:
+            match type(event).__name__:
+                case "StreamStartEvent" | "StreamEndEvent" | "DocumentEndEvent":
+                    continue
+                case "DocumentStartEvent":
+                    documents += 1
+                    if documents > 1:
+                        self.reject(event, "a second document starts here; a file holds one")
+                    if event.version is not None and tuple(event.version) != (1, 2):
+                        written = ".".join(str(part) for part in event.version)
+                        self.reject(event, f"%YAML {written}: only YAML 1.2 is read; remove this line")
+                case _:
+                    root = self.node(event, 1)
+        if root is None or (root.value is None and not root.text):
+            self.problems.append(Problem("the file is empty", file=self.file))
+            return None
+        return root
+
+    def place(self, event: Any) -> Place:
+        return Place(self.file, event.start_mark.line + 1, event.start_mark.column + 1)
+
+    def report(self, event: Any, message: str) -> None:
+        self.problems.append(self.place(event).problem(message))
+
+    def reject(self, event: Any, message: str) -> None:
+        self.report(event, message)
+        raise _Rejected
+
+    def count(self, event: Any, nodes: int) -> None:
+        self.nodes += nodes
+        if self.nodes > MAX_NODES:
+            self.reject(event, f"more than {MAX_NODES} values with every alias written out")
+
+    def node(self, event: Any, depth: int) -> Node:
+        kind = type(event).__name__
+        if kind == "AliasEvent":
+            return self.alias(event)
+        if depth > MAX_DEPTH:
+            self.reject(event, f"collections nested more than {MAX_DEPTH} deep")
+        self.count(event, 1)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = None
+        if kind == "ScalarEvent":
+            node = self.scalar(event)
+        elif kind == "MappingStartEvent":
+            self.check_collection_tag(event, "map")
+            node = self.mapping(event, depth)
+        else:
+            self.check_collection_tag(event, "seq")
+            node = self.sequence(event, depth)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = node
+        return node
+
+    def alias(self, event: Any) -> Node:
+        if event.anchor not in self.anchors:
+            self.reject(event, f"alias *{event.anchor} has no anchor &{event.anchor} above it")
+        node = self.anchors[event.anchor]
+        if node is None:
+            self.reject(event, f"alias *{event.anchor} is inside its own anchor")
+        assert node is not None
+        self.count(event, node.size)
+        return node
+
+    def mapping(self, start: Any, depth: int) -> Node:
+        node = Node(self.place(start), {})
+        for event in self.events:
+            if type(event).__name__ == "MappingEndEvent":
+                break
+            key = self.node(event, depth + 1)
+            value = self.node(next(self.events), depth + 1)
+            node.size += key.size + value.size
+            name = key.value
+            if not isinstance(name, str):
+                self.report(event, f"key {key.shown()} is not text; keys are text, write it in quotes")
+            elif name == "<<" and key.text == "<<":
+                self.report(
+                    event, "merge keys (<<) are not YAML 1.2; write the keys out, or use an alias for the whole"
+                )
+            elif name in node.keys:
+                self.report(event, f"{name}: the key is written twice; the first is at {node.keys[name]}")
+            else:
+                node.mapping[name] = value
+                node.keys[name] = self.place(event)
+        return node
+
+    def sequence(self, start: Any, depth: int) -> Node:
+        node = Node(self.place(start), [])
+        for event in self.events:
+            if type(event).__name__ == "SequenceEndEvent":
+                break
+            item = self.node(event, depth + 1)
+            node.size += item.size
+            node.sequence.append(item)
+        return node
+
+    def check_collection_tag(self, event: Any, expected: str) -> None:
+        if event.tag is not None and str(event.tag) not in ("!", _TAG + expected):
+            self.report(event, f"tag {event.tag} is not part of the language; remove it")
+
+    def scalar(self, event: Any) -> Node:
+        text: str = event.value
+        node = Node(self.place(event), text, text=text)
+        if not text.isascii() and any(0xD800 <= ord(character) <= 0xDFFF for character in text):
+            self.report(event, "half of a surrogate pair is not a character; write the character itself")
+            node.value = ""
+            return node
+        tag = None if event.tag is None else str(event.tag)
+        if tag is None:
+            if event.implicit[0]:
+                node.value = self.resolve(event, text)
+        elif tag.removeprefix(_TAG) in ("int", "float", "bool", "null"):
+            node.value = self.resolve(event, text)
+            wanted = tag.removeprefix(_TAG)
+            if wanted == "float" and type(node.value) is int:
+                node.value = float(node.value)
+            if wanted != {int: "int", float: "float", bool: "bool", type(None): "null"}.get(type(node.value), "str"):
+                self.report(event, f"{text!r} is not a YAML {wanted}, as its tag says")
+        elif tag not in ("!", _TAG + "str"):
+            self.report(event, f"tag {tag} is not part of the language; remove it")
+        return node
+
+    def resolve(self, event: Any, text: str) -> Scalar:
+        """Return what a plain scalar means in the core schema."""
+        if text in _NULL:
+            return None
+        if text in _TRUE or text in _FALSE:
+            return text in _TRUE
+        if _INFINITY.fullmatch(text):
+            return -math.inf if text[0] == "-" else math.inf
+        if text in _NOT_A_NUMBER:
+            return math.nan
+        integer = _INTEGER.fullmatch(text) is not None
+        if not integer and _FLOAT.fullmatch(text) is None:
+            return text
+        if len(text) > MAX_DIGITS:
+            self.report(event, f"a number of {len(text)} characters; at most {MAX_DIGITS} are read")
+            return 0
+        if integer:
+            bases = {"0o": 8, "0x": 16}
+            base = bases.get(text[:2], 10)
+            return int(text[2:] if base != 10 else text, base)
+        number = float(text)
+        if math.isinf(number):
+            self.report(event, f"{text} is too large for a number; write .inf where infinity is meant")
+            return 0.0
+        return number

@@ -1,0 +1,214 @@
+"""The exact integral of 1/dist(x, plate) over a triangle: clipping by the plate's regions, then closed forms.
+
+The plate is |x| <= hx, |y| <= hy in z = 0 of its own frame. A point's distance has the components u = max(|x| - hx, 0),
+v = max(|y| - hy, 0) and z; region I has u = v = 0, region II one of them, region III both. The triangle is clipped by
+z = 0 and by the four border planes into at most 9 convex pieces a side, each is fanned into triangles, and
+
+    int dA/dist = area sum over the fans of share x mean of 1/|(u, v, z)|,
+
+u, v and z being linear on a piece. All terms are positive. What makes it exact to rounding:
+
+- A corner of a piece keeps its barycentric coordinates in the triangle, from which shares of the area are taken: no
+  area is lost, however small the triangle is against its coordinates, or the piece against the triangle.
+- It also keeps its z and its four distances beyond the borders. Each is a convex combination of the triangle's corners,
+  which are exact differences; a distance that has just been cut is exactly 0. So every coordinate of a piece is
+  accurate to its own size, and a piece lies in one octant, which is what the closed forms ask for.
+- Where an edge crosses z = 0 or a border in x, the distances beyond the other borders may cancel; they are formed there
+  with twice the digits. (Cuts in y come last and combine only distances of one sign.)
+- An edge is cut at the same point, to the last digit, whichever of its two pieces asks.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics.double_double import difference_of_products
+from replay.numerics.inverse_distance import mean_over_triangle
+from replay.numerics.jit import kernel
+from replay.numerics.log_difference import mean_inverse_linear
+from replay.sensing.capacitive.contact import SATURATED, borders, contact, crossing
+
+Floats = NDArray[np.float64]
+
+SHARE_A, SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(8)
+LOW = 4
+COLUMNS = 12
+"""Columns of a polygon's corner: barycentric coordinates, |z|, distances beyond the borders. What
+rounding took from a distance is LOW columns behind it."""
+
+NONE = -1
+_ROUNDING_SHARE = 1e-12
+SCRATCH = (4, 12, COLUMNS)
+"""Shape of the scratch memory of `integral_over_triangle`: four polygons of up to 12 corners."""
+
+
+@kernel
+def integral_over_triangle(
+    triangle: Floats, area: float, half_x: float, half_y: float, both: bool, scratch: Floats
+) -> float:
+    """Return int dA/dist [m] of a triangle (3, 3) [m] of known area [m^2], in the plate's frame; inf if saturated."""
+    if area <= 0.0:
+        return 0.0
+    z0, z1, z2 = triangle[0, 2], triangle[1, 2], triangle[2, 2]
+    above = z0 > 0.0 or z1 > 0.0 or z2 > 0.0
+    below = z0 < 0.0 or z1 < 0.0 or z2 < 0.0
+    if not above and not both:
+        return 0.0
+    if not (above and below) and min(abs(z0), abs(z1), abs(z2)) > 0.0:
+        return area * _half(triangle, 1.0 if above else -1.0, half_x, half_y, scratch)
+    if contact(triangle, area, half_x, half_y, both) == SATURATED:
+        return math.inf
+    mean = 0.0
+    if above or not below:
+        mean = _half(triangle, 1.0, half_x, half_y, scratch)
+    if both and below:
+        mean += _half(triangle, -1.0, half_x, half_y, scratch)
+    return area * mean
+
+
+@kernel
+def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: Floats) -> float:
+    """Return the sum of share x mean of 1/dist over the triangle's part with sign z >= 0."""
+    polygon, slab, piece, spare = scratch[0], scratch[1], scratch[2], scratch[3]
+    count = _cut_by_plate_plane(triangle, sign, half_x, half_y, polygon)
+    total = 0.0
+    for column in range(3):
+        u = (EAST, WEST, NONE)[column]
+        in_slab = _region(polygon, count, u, EAST, slab, spare)
+        if in_slab < 3:
+            continue
+        for row in range(3):
+            v = (NORTH, SOUTH, NONE)[row]
+            total += _fan(piece, _region(slab, in_slab, v, NORTH, piece, spare), u, v)
+    return total
+
+
+@kernel
+def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
+    """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE."""
+    first = border if outside == NONE else outside
+    sign = -1.0 if outside == NONE else 1.0
+    kept = 0
+    for step in range(2 if outside == NONE else 1):
+        # first into `spare` when a second cut follows
+        source = polygon if step == 0 else spare
+        target = spare if outside == NONE and step == 0 else result
+        kept = _clip(source, count if step == 0 else kept, first + step, sign, target)
+    return kept
+
+
+@kernel
+def _fan(piece: Floats, count: int, u: int, v: int) -> float:
+    """Return the sum of share x mean of 1/|(u, v, z)| over the triangles that fan out from a piece's first corner."""
+    total = 0.0
+    for k in range(1, count - 1):
+        a, b, c = piece[0], piece[k], piece[k + 1]
+        share = _share(a, b, c)
+        if share <= 0.0:
+            continue
+        if u == NONE and v == NONE:
+            mean = mean_inverse_linear(a[HEIGHT], b[HEIGHT], c[HEIGHT])
+        else:
+            mean = mean_over_triangle(_distance(a, u, v), _distance(b, u, v), _distance(c, u, v))
+        # the triangle as a whole is finite: an infinite mean belongs to a piece which only rounding made
+        if mean < math.inf or share > _ROUNDING_SHARE:
+            total += share * mean
+    return total
+
+
+@kernel
+def _share(a: Floats, b: Floats, c: Floats) -> float:
+    """Return the area of a piece's triangle over the whole one's, from the two coordinates that are smallest there."""
+    in_a = a[SHARE_A] + b[SHARE_A] + c[SHARE_A]
+    in_b = a[SHARE_B] + b[SHARE_B] + c[SHARE_B]
+    in_c = a[SHARE_C] + b[SHARE_C] + c[SHARE_C]
+    first, second = SHARE_B, SHARE_C
+    if in_b >= in_a and in_b >= in_c:
+        first = SHARE_A
+    elif in_c >= in_a:
+        second = SHARE_A
+    return abs((b[first] - a[first]) * (c[second] - a[second]) - (b[second] - a[second]) * (c[first] - a[first]))
+
+
+@kernel
+def _distance(corner: Floats, u: int, v: int) -> tuple[float, float, float]:
+    return (corner[u] if u != NONE else 0.0, corner[v] if v != NONE else 0.0, corner[HEIGHT])
+
+
+@kernel
+def _clip(polygon: Floats, count: int, column: int, sign: float, result: Floats) -> int:
+    """Write the part of a convex polygon where sign x column >= 0 to `result`; return its number of corners."""
+    kept = 0
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        here, there = sign * polygon[k, column], sign * polygon[following, column]
+        if here >= 0.0:
+            for c in range(COLUMNS):
+                result[kept, c] = polygon[k, c]
+            kept += 1
+        if (here > 0.0 > there) or (here < 0.0 < there):
+            # weights by sign, not by direction: both sides of the cut compute the same point
+            p, n = (k, following) if polygon[k, column] > 0.0 else (following, k)
+            span = polygon[p, column] - polygon[n, column]
+            w_p, w_n = -polygon[n, column] / span, polygon[p, column] / span
+            for c in range(LOW + EAST):
+                result[kept, c] = w_p * polygon[p, c] + w_n * polygon[n, c]
+                if column <= WEST and c >= NORTH:
+                    cross = difference_of_products(
+                        (polygon[p, column], polygon[p, column + LOW]),
+                        (polygon[n, c], polygon[n, c + LOW]),
+                        (polygon[n, column], polygon[n, column + LOW]),
+                        (polygon[p, c], polygon[p, c + LOW]),
+                    )
+                    result[kept, c] = cross[0] / span
+            for c in range(LOW + EAST, COLUMNS):
+                result[kept, c] = 0.0
+            result[kept, column] = 0.0
+            kept += 1
+    return kept
+
+
+@kernel
+def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: float, polygon: Floats) -> int:
+    """Write the part of a triangle where sign z >= 0 as a polygon with all its columns; return its corner count."""
+    kept = 0
+    for k in range(3):
+        following = k + 1 if k < 2 else 0
+        p, q = triangle[k], triangle[following]
+        here, there = sign * p[2], sign * q[2]
+        if here >= 0.0:
+            corner = polygon[kept]
+            corner[SHARE_A] = 1.0 if k == 0 else 0.0
+            corner[SHARE_B] = 1.0 if k == 1 else 0.0
+            corner[SHARE_C] = 1.0 if k == 2 else 0.0
+            corner[HEIGHT] = here
+            east, west, north, south = borders(p[0], p[1], half_x, half_y)
+            corner[EAST], corner[WEST], corner[NORTH], corner[SOUTH] = east[0], west[0], north[0], south[0]
+            corner[EAST + LOW], corner[WEST + LOW] = east[1], west[1]
+            corner[NORTH + LOW], corner[SOUTH + LOW] = north[1], south[1]
+            kept += 1
+        if (here > 0.0 > there) or (here < 0.0 < there):
+            corner = polygon[kept]
+            high, low = (k, following) if p[2] > 0.0 else (following, k)
+            above, below = triangle[high], triangle[low]
+            span = above[2] - below[2]
+            w_high, w_low = -below[2] / span, above[2] / span
+            corner[SHARE_A] = w_high if high == 0 else (w_low if low == 0 else 0.0)
+            corner[SHARE_B] = w_high if high == 1 else (w_low if low == 1 else 0.0)
+            corner[SHARE_C] = w_high if high == 2 else (w_low if low == 2 else 0.0)
+            corner[HEIGHT] = 0.0
+            east, west, north, south = crossing(
+                above[2],
+                borders(above[0], above[1], half_x, half_y),
+                below[2],
+                borders(below[0], below[1], half_x, half_y),
+            )
+            corner[EAST], corner[WEST] = east[0] / span, west[0] / span
+            corner[NORTH], corner[SOUTH] = north[0] / span, south[0] / span
+            for c in range(EAST + LOW, COLUMNS):
+                corner[c] = 0.0
+            kept += 1
+    return kept

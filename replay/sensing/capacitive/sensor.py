@@ -1,0 +1,82 @@
+"""Plates and sensors as they are declared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue
+from replay.sensing.capacitive.integral import SIDES, check_half_size
+
+Floats = NDArray[np.float64]
+
+FACES = ("all", "facing")
+VACUUM_PERMITTIVITY = 8.8541878128e-12
+"""[F/m], CODATA 2018."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """One rectangle of a sensor.
+
+    Attributes:
+        name: of the plate.
+        T_link_plate: (4, 4), pose in the sensor's link; the plate is |x| <= hx, |y| <= hy, z = 0, its front is +z.
+        half_size: (2,) [m], hx and hy.
+    """
+
+    name: str
+    T_link_plate: Floats
+    half_size: Floats
+
+    def __post_init__(self) -> None:
+        check_half_size(self.half_size)
+        if np.shape(self.T_link_plate) != (4, 4) or not np.isfinite(self.T_link_plate).all():
+            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a finite (4, 4) pose")
+
+
+@dataclass(frozen=True, eq=False)
+class CapacitiveSensor:
+    """Plates of one link, wired in parallel behind one voltage divider.
+
+    Attributes:
+        name: of the sensor.
+        link: index of the link that carries the plates.
+        plates: at least one.
+        coupling: C_couple [F], > 0.
+        permittivity: eps [F/m], > 0; a fitted number (see METHODS 4.3), the vacuum's unless calibrated.
+        supply: V_in [V].
+        side: "front" counts what lies on the side of the plate's normal, "both" counts all.
+        faces: "all" counts every triangle; "facing" counts those whose outer side the plate's centre lies on, strictly:
+            n.(c - a) > 0 for the outward normal n, a corner a and the centre c.
+        ignored_links: indices of links whose shapes are not sensed; the own link never is.
+    """
+
+    name: str
+    link: int
+    plates: tuple[Plate, ...]
+    coupling: float
+    permittivity: float = VACUUM_PERMITTIVITY
+    supply: float = 2.5
+    side: str = "front"
+    faces: str = "all"
+    ignored_links: frozenset[int] = field(default_factory=frozenset)
+
+    def __post_init__(self) -> None:
+        place = f"sensor {self.name!r}"
+        if not self.plates:
+            raise InvalidValue(f"{place}: plates", (), "must be at least one")
+        for name in ("coupling", "permittivity", "supply"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InvalidValue(f"{place}: {name}", value, "must be finite and > 0")
+        if self.side not in SIDES:
+            raise InvalidValue(f"{place}: side", self.side, f"must be one of {', '.join(SIDES)}")
+        if self.faces not in FACES:
+            raise InvalidValue(f"{place}: faces", self.faces, f"must be one of {', '.join(FACES)}")
+
+    def senses(self, link: int) -> bool:
+        """Return whether shapes on a link are sensed."""
+        return link != self.link and link not in self.ignored_links

@@ -1,0 +1,280 @@
+"""The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
+
+The tree is walked from the root. A node (or triangle) of area A whose own rigorous error bound E fits the budget is
+summed at once, else it is opened; a triangle that does not fit is integrated in closed form. The budget is one: every
+node that has been summed brought rtol x its own lower bound A/(r + h) and took E, and the rest is left for the nodes to
+come. So the sum of all E never exceeds rtol times a lower bound of the sum, and the result meets rtol.
+
+Bounds. Let r be the distance components of the centroid in its region (u, v, z with the region's zeros), r its length,
+h the largest distance of a corner from the centroid, d a point's place about it, x = h/r < 1. Inside one region
+1/dist = 1/|r + Pd|, P dropping the region's zero components, and by Legendre's expansion
+
+    1/|r + Pd| = sum_k (-1)^k |Pd|^k P_k(cos) / r^(k+1),   |rest after order p| <= |d|^(p+1) / (r^(p+2) (1 - x)).
+
+- A cluster takes orders 0, 2, 3, 4 from its moments (order 1 vanishes at the centroid):
+  E = A spread4 h / (r^6 (1 - x)), spread4 the mean of |d|^4.
+- Part of it may lie over a border, by at most w: there 1/dist is expanded in the wrong region's form, whose squared
+  distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3), mean(w^2) <= min(largest w^2, variance across the
+  border). Nothing is clipped: that error is far below what the border's curvature jump seems to cost.
+- A single triangle: 1 point, E = A spread2/(r - h)^3, borders or not (|Hessian of 1/dist| <= 2/dist^3); 3 points of
+  degree 2, E = 1.5 A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = 2 A h^4 spread2/(r^7 (1 - x)); the last two
+  plus the border's term.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.numerics.double_double import two_sum
+from replay.numerics.jit import kernel
+from replay.sensing.capacitive.clusters import PAIRS, Clusters
+from replay.sensing.capacitive.exact import SCRATCH
+from replay.sensing.capacitive.triangle_rules import allowance, triangle_within
+from replay.sensing.capacitive.triangle_sum import into_plate
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Legendre's fourth polynomial, 35 t^2 - 30 t + 3 = 35 (t - _T1)(t - _T2) in t = cos^2, lets one product of M4 do.
+_T1 = (30.0 + math.sqrt(480.0)) / 70.0
+_T2 = (30.0 - math.sqrt(480.0)) / 70.0
+
+
+@kernel
+def sum_tree(
+    clusters: Clusters,
+    tree: Tree,
+    T_plate_body: Floats,
+    half_sizes: Floats,
+    both: bool,
+    facing: bool,
+    rtol: float,
+) -> tuple[Floats, Flags, Floats]:
+    """Return what `sum_triangles` returns, to a relative tolerance, and the rigorous bound of the error.
+
+    Args:
+        clusters, tree: of the body, in its frame.
+        T_plate_body: (n, p, 4, 4); half_sizes: (p, 2) [m]; both, facing: see `CapacitiveSensor`.
+        rtol: largest relative error of each of the n x p integrals.
+
+    Returns:
+        (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
+    """
+    n, plates = len(T_plate_body), len(half_sizes)
+    integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
+    bound = np.zeros((n, plates))
+    scratch, corners, stack = np.empty(SCRATCH), np.empty((3, 3)), np.empty(MAX_DEPTH + 1, np.int64)
+    for frame in range(n):
+        for plate in range(plates):
+            integral[frame, plate], touching[frame, plate], bound[frame, plate] = _walk(
+                clusters,
+                tree,
+                T_plate_body[frame, plate],
+                half_sizes[plate, 0],
+                half_sizes[plate, 1],
+                both,
+                facing,
+                rtol,
+                scratch,
+                corners,
+                stack,
+            )
+    return integral, touching, bound
+
+
+@kernel
+def _walk(
+    clusters: Clusters,
+    tree: Tree,
+    T: Floats,
+    half_x: float,
+    half_y: float,
+    both: bool,
+    facing: bool,
+    rtol: float,
+    scratch: Floats,
+    corners: Floats,
+    stack: NDArray[np.int64],
+) -> tuple[float, bool, float]:
+    total, lost, saved, spent = 0.0, 0.0, 0.0, 0.0
+    touching = False
+    centre = (
+        -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
+        -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
+        -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
+    )
+    stack[0] = 0
+    size = 1
+    while size > 0:
+        size -= 1
+        node = stack[size]
+        x, y, z = _place(T, clusters.centroid[node, 0], clusters.centroid[node, 1], clusters.centroid[node, 2])
+        h, area = clusters.radius[node], clusters.area[node]
+        if not both and z + h < 0.0:
+            continue
+        u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
+        v = y - math.copysign(half_y, y) if abs(y) > half_y else 0.0
+        r = math.sqrt(u * u + v * v + z * z)
+        if r > 2.0 * h:
+            share = rtol * area / (r + h)
+            allowed = allowance(share, saved)
+            error = area * clusters.spread4[node] * h / (r * r * r * r * r * (r - h))
+            if error <= allowed:
+                verdict = 1
+                if not both and z - h <= 0.0:
+                    verdict = _side(clusters, tree, T, node, z)
+                if facing and verdict == 1:
+                    verdict = _faces(clusters, node, centre)
+                if verdict == -1:
+                    continue
+                if verdict == 1:
+                    error += _border_error(clusters, tree, T, node, x, y, half_x, half_y, area, h, r)
+                    if error <= allowed:
+                        value = area * _expansion(clusters, T, node, u, v, z, r)
+                        total, e = two_sum(total, value)
+                        lost += e
+                        saved += share - error
+                        spent += error
+                        continue
+        if tree.second[node] >= 0:
+            stack[size] = tree.second[node]
+            stack[size + 1] = node + 1
+            size += 2
+            continue
+        for k in range(tree.begin[node], tree.end[node]):
+            into_plate(T, clusters.triangles[k], corners)
+            value, share, error, touches = triangle_within(
+                corners, clusters.areas[k], half_x, half_y, both, facing, rtol, saved, scratch
+            )
+            touching = touching or touches
+            if value == math.inf:
+                return math.inf, True, 0.0
+            total, e = two_sum(total, value)
+            lost += e
+            saved += share - error
+            spent += error
+    return total + lost, touching, spent
+
+
+@kernel
+def _place(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    return (
+        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
+        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
+        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
+    )
+
+
+@kernel
+def _reach(clusters: Clusters, tree: Tree, T: Floats, node: int, axis: int, sign: float) -> float:
+    """Return how far the node's box reaches from its centroid along a plate axis, sign +1 or -1."""
+    reach = 0.0
+    for k in range(3):
+        e = sign * T[axis, k]
+        edge = tree.upper[node, k] if e > 0.0 else tree.lower[node, k]
+        reach += e * (edge - clusters.centroid[node, k])
+    return min(reach, clusters.radius[node])
+
+
+@kernel
+def _side(clusters: Clusters, tree: Tree, T: Floats, node: int, z: float) -> int:
+    """Return 1 when the node is in front of the plate's plane, -1 when it is behind, 0 when it may be both."""
+    if z - _reach(clusters, tree, T, node, 2, -1.0) > 0.0:
+        return 1
+    return -1 if z + _reach(clusters, tree, T, node, 2, 1.0) < 0.0 else 0
+
+
+@kernel
+def _faces(clusters: Clusters, node: int, centre: tuple[float, float, float]) -> int:
+    """Return 1 when all triangles of the node face the plate's centre, -1 when none does, 0 when it may be either.
+
+    With v from the centroid to the centre, the angle between a normal and the way from a corner to the centre differs
+    from that between the cone's axis and v by at most the cone's half angle plus asin(h/|v|).
+    """
+    cx = centre[0] - clusters.centroid[node, 0]
+    cy = centre[1] - clusters.centroid[node, 1]
+    cz = centre[2] - clusters.centroid[node, 2]
+    distance = math.sqrt(cx * cx + cy * cy + cz * cz)
+    h, opening = clusters.radius[node], clusters.opening[node]
+    if opening <= 0.0 or h >= distance:
+        return 0
+    normal = clusters.normal[node]
+    cosine = (cx * normal[0] + cy * normal[1] + cz * normal[2]) / distance
+    # |cosine| > sin(half angle + asin(h/|v|)), both angles below 90 degrees and so must be their sum
+    sine_cone = math.sqrt(max(0.0, 1.0 - opening * opening))
+    sine_ball = h / distance
+    cosine_ball = math.sqrt(max(0.0, 1.0 - sine_ball * sine_ball))
+    if opening * cosine_ball - sine_cone * sine_ball <= 0.0:
+        return 0
+    limit = sine_cone * cosine_ball + opening * sine_ball + 1e-9
+    if cosine > limit:
+        return 1
+    return -1 if cosine < -limit else 0
+
+
+@kernel
+def _border_error(
+    clusters: Clusters,
+    tree: Tree,
+    T: Floats,
+    node: int,
+    x: float,
+    y: float,
+    half_x: float,
+    half_y: float,
+    area: float,
+    h: float,
+    r: float,
+) -> float:
+    """Return the error bound [m] of expanding the whole node in the region of its centroid."""
+    over = 0.0
+    for axis in range(2):
+        position, half = (x, half_x) if axis == 0 else (y, half_y)
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            # towards the border at sign x half, from either side of it
+            gap = half - sign * position
+            beyond = _reach(clusters, tree, T, node, axis, sign if gap >= 0.0 else -sign) - abs(gap)
+            if beyond > 0.0:
+                over += min(beyond * beyond, _variance(clusters, T, node, axis))
+    return area * over / (2.0 * (r - h) ** 3)
+
+
+@kernel
+def _variance(clusters: Clusters, T: Floats, node: int, axis: int) -> float:
+    s = clusters.second[node]
+    a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
+    return a * a * s[0] + b * b * s[1] + c * c * s[2] + 2.0 * (a * b * s[3] + a * c * s[4] + b * c * s[5])  # type: ignore[no-any-return]
+
+
+@kernel
+def _expansion(clusters: Clusters, T: Floats, node: int, u: float, v: float, z: float, r: float) -> float:
+    """Return the mean of 1/dist over a node, from its moments up to the fourth."""
+    inverse = 1.0 / r
+    # the direction of r in the body's frame; t = (n.d)^2, q = |Pd|^2 as quadratic forms of d, entries xy.. doubled
+    n0 = (T[0, 0] * u + T[1, 0] * v + T[2, 0] * z) * inverse
+    n1 = (T[0, 1] * u + T[1, 1] * v + T[2, 1] * z) * inverse
+    n2 = (T[0, 2] * u + T[1, 2] * v + T[2, 2] * z) * inverse
+    drop_x, drop_y = 1.0 if u == 0.0 else 0.0, 1.0 if v == 0.0 else 0.0
+    second, third, fourth = clusters.second[node], clusters.third[node], clusters.fourth[node]
+    t = (n0 * n0, n1 * n1, n2 * n2, 2.0 * n0 * n1, 2.0 * n0 * n2, 2.0 * n1 * n2)
+    order2, order3, order4 = 0.0, 0.0, 0.0
+    for i in range(6):
+        a, b = PAIRS[i, 0], PAIRS[i, 1]
+        q_i = (1.0 if i < 3 else 0.0) - drop_x * T[0, a] * T[0, b] - drop_y * T[1, a] * T[1, b]
+        q_i = q_i if i < 3 else 2.0 * q_i
+        order2 += (1.5 * t[i] - 0.5 * q_i) * second[i]
+        along = n0 * third[0, i] + n1 * third[1, i] + n2 * third[2, i]
+        order3 += (2.5 * t[i] - 1.5 * q_i) * along
+        row = 0.0
+        for j in range(6):
+            c, d = PAIRS[j, 0], PAIRS[j, 1]
+            q_j = (1.0 if j < 3 else 0.0) - drop_x * T[0, c] * T[0, d] - drop_y * T[1, c] * T[1, d]
+            row += (t[j] - _T2 * (q_j if j < 3 else 2.0 * q_j)) * fourth[i, j]
+        order4 += (t[i] - _T1 * q_i) * row
+    order4 *= 35.0 / 8.0
+    return inverse * (1.0 + inverse * inverse * (order2 - inverse * (order3 - inverse * order4)))

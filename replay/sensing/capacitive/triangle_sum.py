@@ -1,0 +1,94 @@
+"""The sum over all triangles of a body, one by one: `exact` and `midpoint` for every pose and plate."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics.double_double import triangle_area, two_sum
+from replay.numerics.jit import kernel
+from replay.sensing.capacitive.contact import CLEAR, contact
+from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
+from replay.sensing.capacitive.midpoint import midpoint_over_triangle
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EXACT = -1
+"""As `splits`: the closed forms instead of the midpoint rule."""
+
+
+@kernel
+def triangle_areas(triangles: Floats) -> Floats:
+    """Return the areas (n,) [m^2] of triangles (n, 3, 3) [m]."""
+    result = np.empty(len(triangles))
+    for k in range(len(triangles)):
+        result[k] = triangle_area(triangles[k])
+    return result
+
+
+@kernel
+def into_plate(T_plate_body: Floats, triangle: Floats, result: Floats) -> None:
+    """Write a triangle's corners in the plate's frame to `result` (3, 3)."""
+    for k in range(3):
+        x, y, z = triangle[k, 0], triangle[k, 1], triangle[k, 2]
+        for r in range(3):
+            result[k, r] = T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
+
+
+@kernel
+def faces_centre(triangle: Floats) -> bool:
+    """Return whether the outer side of a triangle in the plate's frame holds the plate's centre, n.(0 - a) > 0."""
+    a, b, c = triangle[0], triangle[1], triangle[2]
+    bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    cx, cy, cz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    outward = (by * cz - bz * cy) * a[0] + (bz * cx - bx * cz) * a[1] + (bx * cy - by * cx) * a[2]
+    return outward < 0.0  # type: ignore[no-any-return]
+
+
+@kernel
+def sum_triangles(
+    triangles: Floats,
+    areas: Floats,
+    T_plate_body: Floats,
+    half_sizes: Floats,
+    both: bool,
+    facing: bool,
+    splits: int,
+) -> tuple[Floats, Flags]:
+    """Return the integral over a body and whether the body touches the plate, for every pose and plate.
+
+    Args:
+        triangles: (k, 3, 3) [m], in the body's frame; areas: (k,) [m^2].
+        T_plate_body: (n, p, 4, 4).
+        half_sizes: (p, 2) [m].
+        both, facing: what counts, see `CapacitiveSensor`.
+        splits: of the midpoint rule, or EXACT.
+
+    Returns:
+        (n, p) [m], inf when saturated, and (n, p) flags. The sum is compensated and in the order of the triangles.
+    """
+    n, plates = len(T_plate_body), len(half_sizes)
+    integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
+    scratch, corners = np.empty(SCRATCH), np.empty((3, 3))
+    for frame in range(n):
+        for plate in range(plates):
+            half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
+            total, lost = 0.0, 0.0
+            for k in range(len(triangles)):
+                into_plate(T_plate_body[frame, plate], triangles[k], corners)
+                if contact(corners, areas[k], half_x, half_y, both) != CLEAR:
+                    touching[frame, plate] = True
+                if facing and not faces_centre(corners):
+                    continue
+                if splits == EXACT:
+                    value = integral_over_triangle(corners, areas[k], half_x, half_y, both, scratch)
+                else:
+                    value = midpoint_over_triangle(corners, areas[k], half_x, half_y, both, splits)
+                if value == np.inf:
+                    total, lost = np.inf, 0.0
+                elif total < np.inf:
+                    total, error = two_sum(total, value)
+                    lost += error
+            integral[frame, plate] = total + lost
+    return integral, touching

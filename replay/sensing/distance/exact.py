@@ -1,0 +1,82 @@
+"""The exact sensor over a block of frames, one sensor and one target at a time, in compiled code."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.numerics.jit import kernel
+from replay.sensing.distance.cone import Cone
+from replay.sensing.distance.query import closest_in_tree
+from replay.sensing.distance.readings import Nearest
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def same_pose(poses: Array, a: int, b: int) -> bool:
+    """Return whether frames a and b hold the same pose, bit for bit."""
+    for row in range(3):
+        for column in range(4):
+            if poses[a, row, column] != poses[b, row, column]:
+                return False
+    return True
+
+
+@kernel
+def axis_of(pose: Array) -> tuple[float, float, float]:
+    """Return the unit z axis of a pose."""
+    x, y, z = pose[0, 2], pose[1, 2], pose[2, 2]
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@kernel
+def sweep_exact(
+    triangles: Array,
+    tree: Tree,
+    T_target_sensor: Array,
+    cos_half: float,
+    sin_half: float,
+    reach: float,
+    target: int,
+    nearest: Nearest,
+) -> None:
+    """Update `nearest` in every frame with the target's closest point in the sensor's cone.
+
+    The last frame's triangle is the starting bound, and a frame with the pose of the one before reuses its answer;
+    neither changes any bit of the result.
+
+    Args:
+        triangles, tree: of the target, in its link's frame.
+        T_target_sensor: (n, 4, 4) sensor in the frame of the target's link.
+        cos_half, sin_half: of the cone's half angle.
+        reach: the sensor's range [m].
+        target: what to write as `nearest.target`.
+        nearest: best candidates of the targets before.
+    """
+    stack, bounds = np.empty(MAX_DEPTH, dtype=np.int64), np.empty(MAX_DEPTH)
+    distance, offset, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
+    searched_to, start = -1.0, -1
+    for i in range(len(T_target_sensor)):
+        limit = min(reach, nearest.distance[i])
+        known = i > 0 and same_pose(T_target_sensor, i, i - 1) and (triangle >= 0 or limit <= searched_to)
+        if not known:
+            pose = T_target_sensor[i]
+            v = axis_of(pose)
+            cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
+            apex = (pose[0, 3], pose[1, 3], pose[2, 3])
+            distance, offset, triangle, case = closest_in_tree(triangles, tree, apex, cone, limit, start, stack, bounds)
+            searched_to = limit
+            if triangle >= 0:
+                start = triangle
+        if triangle >= 0 and distance <= limit and distance < nearest.distance[i]:
+            nearest.distance[i] = distance
+            for k in range(3):
+                nearest.offset[i, k] = offset[k]
+            nearest.target[i] = target
+            nearest.triangle[i] = triangle
+            nearest.case[i] = case

@@ -1,0 +1,159 @@
+"""All distance sensors of a scene, over blocks of frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import InvalidValue
+from replay.kinematics.linkage import LinkPoses
+from replay.numerics import transforms
+from replay.sensing.columns import DistanceColumns
+from replay.sensing.distance.closest import check_aperture, check_range
+from replay.sensing.distance.cone import half_angle
+from replay.sensing.distance.embree import EmbreeBundle
+from replay.sensing.distance.exact import sweep_exact
+from replay.sensing.distance.rays import cap_directions, sweep_rays
+from replay.sensing.distance.readings import Nearest, empty_columns, nothing_yet, write_sensor
+from replay.sensing.distance.thesis import sweep_thesis
+from replay.sensing.target import Target
+
+Array = NDArray[np.float64]
+Sweep = Callable[["DistanceSensor", int, Array, Nearest], None]
+
+METHODS = ("exact", "rays", "thesis")
+ENGINES = ("own", "embree")
+REVISIONS = {"exact": 1, "rays": 1, "thesis": 1}
+"""Bumped when a method's readings change beyond the shipped comparison rules."""
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceSensor:
+    """A cone that reads the closest point in it.
+
+    Attributes:
+        name: unique among the distance sensors.
+        link: index of the link that carries it.
+        T_link_sensor: (4, 4) its pose on the link: apex at the origin, axis +z.
+        aperture: full opening angle [rad], above 0 up to 2 pi.
+        range: largest distance sensed [m], 0 to inf.
+        min_range: dead zone [m]: what is nearer reads as `Detection.TOO_CLOSE`, with its distance.
+        ignored_links: links that the sensor does not see; its own is always ignored.
+    """
+
+    name: str
+    link: int
+    T_link_sensor: Array
+    aperture: float
+    range: float = math.inf
+    min_range: float = 0.0
+    ignored_links: frozenset[int] = field(default_factory=frozenset)
+
+    def __post_init__(self) -> None:
+        check_aperture(self.aperture)
+        check_range("range", self.range)
+        check_range("min_range", self.min_range)
+        if self.min_range > self.range:
+            raise InvalidValue("min_range", self.min_range, f"must be at most the range, {self.range} m")
+        pose = np.asarray(self.T_link_sensor)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all() or not pose[:3, 2].any():
+            raise InvalidValue("T_link_sensor", pose.tolist(), "must be a rigid transform of shape (4, 4)")
+
+    def sees(self, target: Target) -> bool:
+        """Return whether the target's link is neither the sensor's own nor ignored."""
+        return target.link != self.link and target.link not in self.ignored_links
+
+
+class DistanceSuite:
+    """Reads all distance sensors of a scene.
+
+    Args:
+        sensors: in the order of the columns.
+        targets: everything that is sensed; `DistanceColumns.shape` counts them.
+        method: "exact"; "rays", a bundle of `count` rays; or "thesis", the thesis's own steps with their failures.
+        count: number of rays, 1 or more; used by "rays" only.
+        engine: "own" or "embree" (float32, needs the package embreex); used by "rays" only.
+
+    Raises:
+        InvalidValue: an unknown method or engine, or a count below 1.
+        MissingPackageError: the engine is not installed; another one never takes its place.
+    """
+
+    def __init__(
+        self,
+        sensors: Sequence[DistanceSensor],
+        targets: Sequence[Target],
+        *,
+        method: str = "exact",
+        count: int = 1000,
+        engine: str = "own",
+    ) -> None:
+        if method not in METHODS:
+            raise InvalidValue("method", method, f"must be one of {', '.join(METHODS)}")
+        if engine not in ENGINES:
+            raise InvalidValue("engine", engine, f"must be one of {', '.join(ENGINES)}")
+        if count < 1:
+            raise InvalidValue("count", count, "must be 1 or more")
+        self.sensors = tuple(sensors)
+        self.targets = tuple(targets)
+        self.method = method
+        self._count = count
+        self._sweep = self._sweeper(engine)
+
+    def run(self, poses: LinkPoses) -> DistanceColumns:
+        """Return the readings of all sensors in all frames of a block.
+
+        Args:
+            poses: of all links, n frames.
+
+        Returns:
+            Columns (n, D), in the order of the sensors given. "rays" has no case: its `case` is 0.
+        """
+        frames = len(poses.local)
+        columns = empty_columns(frames, len(self.sensors))
+        for column, sensor in enumerate(self.sensors):
+            nearest = nothing_yet(frames)
+            T_target_sensor: dict[int, Array] = {}
+            for index, target in enumerate(self.targets):
+                if not sensor.sees(target):
+                    continue
+                pose = transforms.compose(poses.relative(target.link, sensor.link), sensor.T_link_sensor)
+                T_target_sensor[index] = np.ascontiguousarray(pose)
+                self._sweep(sensor, index, T_target_sensor[index], nearest)
+            write_sensor(columns, column, nearest, self.targets, T_target_sensor, poses, sensor.min_range)
+        return columns
+
+    def _sweeper(self, engine: str) -> Sweep:
+        if self.method == "exact":
+            return self._exact
+        if self.method == "thesis":
+            return self._thesis
+        self._patterns = [cap_directions(sensor.aperture, self._count) for sensor in self.sensors]
+        if engine == "own":
+            return self._rays
+        bundles = [EmbreeBundle(target.triangles) for target in self.targets]
+
+        def embree(sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+            bundles[index].sweep(pose, self._pattern(sensor), sensor.range, index, nearest)
+
+        return embree
+
+    def _pattern(self, sensor: DistanceSensor) -> Array:
+        return self._patterns[self.sensors.index(sensor)]
+
+    def _exact(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+        target = self.targets[index]
+        cos_half, sin_half = half_angle(sensor.aperture)
+        sweep_exact(target.triangles, target.tree, pose, cos_half, sin_half, sensor.range, index, nearest)
+
+    def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+        cos_half = math.cos(0.5 * sensor.aperture)
+        sweep_thesis(self.targets[index].triangles, pose, cos_half, sensor.range, index, nearest)
+
+    def _rays(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+        target = self.targets[index]
+        sweep_rays(target.triangles, target.tree, pose, self._pattern(sensor), sensor.range, index, nearest)

@@ -1,0 +1,87 @@
+"""Pairs on which public libraries failed, as found, moved and scaled."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from replay.collision.gjk import Status, distance, intersect
+from tests.collision import motions, reference
+
+CASES = {case["id"]: case for case in json.loads((Path(__file__).parents[1] / "data/pairs.json").read_text())["cases"]}
+SAMPLES = 64  # points on a circle of a cylinder or sphere
+
+
+def solid(shape):
+    """Return the vertices of a shape and the chord error of its sampling."""
+    if shape["type"] == "box":
+        return reference.box(shape["size"]), 0.0
+    if shape["type"] == "hull":
+        return np.array(shape["vertices"], dtype=float), 0.0
+    radius = shape["radius"]
+    turn = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    if shape["type"] == "cylinder":
+        assert shape["axis"] == 2 or shape["axis"] == "z"
+        circle = radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        rise = np.array([0, 0, shape["length"] / 2])
+        return np.concatenate([circle - rise, circle + rise]), radius * (1 - np.cos(np.pi / SAMPLES))
+    fall = np.pi * np.arange(SAMPLES // 2 + 1) / (SAMPLES // 2)
+    points = [(np.sin(f) * np.cos(t), np.sin(f) * np.sin(t), np.cos(f)) for f in fall for t in turn]
+    return radius * np.array(points), 2 * radius * (1 - np.cos(np.pi / SAMPLES))
+
+
+def answers(a, b, pose_a, pose_b):
+    """Return the signed answer (distance, 0 for contact), checked for certificates and for both argument orders."""
+    separation = distance(a, b, pose_a=pose_a, pose_b=pose_b)
+    swapped = distance(b, a, pose_a=pose_b, pose_b=pose_a)
+    verdict = intersect(a, b, pose_a=pose_a, pose_b=pose_b)
+    assert separation.status is swapped.status is verdict.status is not Status.UNDECIDED
+    assert separation.distance == swapped.distance
+    assert intersect(b, a, pose_a=pose_b, pose_b=pose_a).status is verdict.status
+    assert 0 <= separation.lower_bound <= separation.distance
+    size = np.abs(a).max() + np.abs(b).max() + np.abs(pose_a[:3, 3] - pose_b[:3, 3]).max()
+    assert separation.distance - separation.lower_bound <= 1e-12 * separation.distance + 2.0**-90 * size
+    for value in (separation.point_a, separation.point_b, separation.distance):
+        assert np.isfinite(value).all()
+    return separation.distance
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_as_found(name):
+    case = CASES[name]
+    (a, chord_a), (b, chord_b) = solid(case["A"]), solid(case["B"])
+    pose_a, pose_b = (motions.pose(case[f"R_{k}"], case[f"p_{k}"]) for k in "AB")
+    found = answers(a, b, pose_a, pose_b)
+    expected, chord = case["expect"], chord_a + chord_b
+    truth = expected.get("signed_distance", expected.get("distance"))
+    if truth is not None:
+        assert abs(found - max(truth, 0.0)) <= expected["tol"] + chord
+        if abs(truth) >= expected["tol"] + chord:
+            assert (found > 0.0) == (truth > 0.0)
+    if "collide" in expected and not expected.get("touching") and chord == 0.0:
+        assert (found == 0.0) == expected["collide"]
+
+
+@pytest.mark.parametrize("name", [k for k, case in CASES.items() if case["A"]["type"] + case["B"]["type"] in
+                                  ("boxbox", "hullhull", "hullbox", "boxhull")])  # fmt: skip
+def test_moved_and_scaled(name):
+    """Truth comes from the rounded poses in extended precision; 1e-15 of the scene's size is left to rounding."""
+    case = CASES[name]
+    a, b = solid(case["A"])[0], solid(case["B"])[0]
+    pose_a, pose_b = (motions.pose(case[f"R_{k}"], case[f"p_{k}"]) for k in "AB")
+    rng = np.random.default_rng(0)
+    trials = [(1.0, motions.random_pose(rng, reach)) for reach in np.repeat([0.0, 1.0, 1e3, 1e6], 5)]
+    trials += [(scale, motions.random_pose(rng, scale)) for scale in (1e-6, 1e-3, 1e3, 1e6)]
+    for scale, move in trials:
+        to_world = [move @ np.block([[p[:3, :3], scale * p[:3, 3:]], [p[3:]]]) for p in (pose_a, pose_b)]
+        origin = to_world[0][:3, 3]
+        truth = reference.signed_distance(
+            reference.placed(scale * a, to_world[0], origin), reference.placed(scale * b, to_world[1], origin)
+        )
+        offset = np.abs(to_world[0][:3, 3] - to_world[1][:3, 3]).max()
+        size = scale * (np.abs(a).max() + np.abs(b).max()) + offset
+        found = answers(scale * a, scale * b, *to_world)
+        assert abs(found - max(float(truth), 0.0)) <= 1e-15 * size
+        if abs(truth) > 1e-15 * size:
+            assert (found > 0.0) == (truth > 0.0)

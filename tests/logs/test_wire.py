@@ -1,0 +1,96 @@
+"""Messages as columns, against the protobuf library's own reading of the same bytes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf import FrameTransform_pb2, JointStates_pb2, LaserScan_pb2, Log_pb2
+from hypothesis import given
+from hypothesis import strategies as st
+
+from replay.errors import InvalidValue
+from replay.logs.wire import MessageShape, shape_of
+
+
+def joints_shape() -> MessageShape:
+    example = JointStates_pb2.JointStates(
+        timestamp={"seconds": 1 << 34, "nanos": 1 << 29},
+        joints=[{"name": "a", "position": 1.0}, {"name": "longer", "position": 1.0}],
+    )
+    shape = shape_of(example.DESCRIPTOR, example.SerializeToString())
+    assert shape is not None
+    return shape
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 2**35 - 1), st.integers(0, 999_999_999), st.floats(), st.floats()), min_size=1)
+)
+def test_filled_columns_are_what_the_library_decodes(rows: list[tuple[int, int, float, float]]) -> None:
+    shape = joints_shape()
+    data = np.empty((len(rows), shape.length), dtype=np.uint8)
+    shape.fill(data)
+    seconds, nanos, first, second = (np.array(column) for column in zip(*rows, strict=True))
+    shape.slots["timestamp.seconds"].write(data, seconds)
+    shape.slots["timestamp.nanos"].write(data, nanos)
+    shape.slots["joints[0].position"].write(data, first)
+    shape.slots["joints[1].position"].write(data, second)
+    assert shape.fits(data)
+    for row, expected in zip(data, rows, strict=True):
+        message = JointStates_pb2.JointStates.FromString(row.tobytes())
+        decoded = [message.timestamp.seconds, message.timestamp.nanos, *(joint.position for joint in message.joints)]
+        assert decoded[:2] == list(expected[:2])
+        assert np.array(decoded[2:]).tobytes() == np.array(expected[2:]).tobytes()
+        assert [joint.name for joint in message.joints] == ["a", "longer"]
+    for path, column in (("timestamp.seconds", seconds), ("timestamp.nanos", nanos), ("joints[1].position", second)):
+        assert shape.slots[path].read(data).astype(column.dtype).tobytes() == column.tobytes()
+
+
+@given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=5), st.integers(1, 2**31 - 1))
+def test_canonical_messages_read_the_same(ranges: list[float], seconds: int) -> None:
+    message = LaserScan_pb2.LaserScan(
+        timestamp={"seconds": seconds, "nanos": 5},
+        frame_id="laser",
+        pose={"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 1, "y": 2, "z": 3, "w": 4}},
+        start_angle=-1.5,
+        end_angle=0.5,
+        ranges=ranges,
+    )
+    data = message.SerializeToString()
+    shape = shape_of(message.DESCRIPTOR, data)
+    assert shape is not None
+    rows = np.frombuffer(data, dtype=np.uint8)[None]
+    assert shape.slots["ranges"].read(rows).tolist() == [ranges]
+    assert shape.slots["timestamp.seconds"].read(rows).tolist() == [seconds]
+    assert shape.slots["pose.orientation.w"].read(rows).tolist() == [4.0]
+    assert shape.texts == {"frame_id": "laser"}
+
+
+def test_what_is_not_regular_is_refused_and_never_misread() -> None:
+    zero_left_out = FrameTransform_pb2.FrameTransform(translation={"x": 1.0, "y": 0.0, "z": 2.0})
+    assert shape_of(zero_left_out.DESCRIPTOR, zero_left_out.SerializeToString()) is None
+    whole = Log_pb2.Log(
+        timestamp={"seconds": 1, "nanos": 1}, level=2, message="text", name="n", file="f", line=7
+    ).SerializeToString()
+    descriptor = Log_pb2.Log.DESCRIPTOR
+    assert shape_of(descriptor, whole) is not None
+    assert shape_of(descriptor, whole + b"\x98\x06\x01") is None  # an unknown field
+    assert shape_of(descriptor, whole + whole) is None  # fields given twice
+    for length in range(1, len(whole)):
+        assert shape_of(descriptor, whole[:length]) is None
+    shape = joints_shape()
+    rows = np.zeros((1, shape.length), dtype=np.uint8)
+    shape.fill(rows)
+    assert shape.fits(rows)
+    for offset, mask in enumerate(shape.mask):
+        changed = rows.copy()
+        changed[0, offset] ^= 0x80
+        assert shape.fits(changed) == (mask == 0)
+
+
+def test_values_too_large_for_their_bytes_are_refused() -> None:
+    shape = joints_shape()
+    rows = np.zeros((1, shape.length), dtype=np.uint8)
+    with pytest.raises(InvalidValue):
+        shape.slots["timestamp.seconds"].write(rows, np.array([2**35]))
+    with pytest.raises(InvalidValue):
+        shape.slots["timestamp.nanos"].write(rows, np.array([-1]))

@@ -1,0 +1,107 @@
+"""A made-up run with every kind of column, for tests of recordings: nothing here is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from replay.collision.columns import CollisionColumns
+from replay.numerics import transforms
+from replay.recording import provenance
+from replay.recording.scene_view import BodyView, ConeView, PlateView, SceneView
+from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.simulation import BLOCK_FRAMES, FrameBlock, Layout
+
+LAYOUT = Layout(
+    links=("arm", "patient", "stand"),
+    joints=("lift", "rotation"),
+    joint_units=("m", "rad"),
+    shapes=("arm/beam", "patient/body", "stand/column"),
+    pairs=("arm/beam|patient/body", "patient/body|stand/column"),
+    distance_sensors=("left", "right ä"),
+    capacitive_sensors=("guard",),
+    objects=("patient/body", "stand/column"),
+)
+FILES = {"run.yaml": b"version: 1\nname: made_up\n", "parts/body.stl": bytes(range(256)) * 20}
+BOX = np.array(
+    [
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[0, 0, 0], [0, 0, 1], [1, 0, 0]],
+        [[1, 0, 0], [0, 0, 1], [0, 1, 0]],
+    ],
+    dtype=np.float64,
+)
+
+
+def scene() -> SceneView:
+    """Return three tetrahedra, a cone each sensor and a plate."""
+    bodies = tuple(
+        BodyView(name, link, 0.3 * BOX, (200, 200 - 40 * link, 210, 255)) for link, name in enumerate(LAYOUT.shapes)
+    )
+    cones = tuple(
+        ConeView(name, 0, transforms.from_translation(np.array([0.1 * k, 0.0, 0.0])), 0.6, (1.5, np.inf)[k])
+        for k, name in enumerate(LAYOUT.distance_sensors)
+    )
+    plate = PlateView("guard", "front", 0, transforms.identity(), np.array([0.05, 0.1]))
+    return SceneView("made_up", "tetrahedra", LAYOUT.links, bodies, cones, (plate,), {"run.yaml": "version: 1\n"})
+
+
+def blocks(frames: int, *, seed: int = 1, wild: bool = True) -> Iterator[FrameBlock]:
+    """Yield blocks with random numbers; `wild` ones include NaN with payloads, signed zeros, infinities, subnormals."""
+    for first in range(0, frames, BLOCK_FRAMES):
+        yield _block(np.random.default_rng([seed, first]), first, min(BLOCK_FRAMES, frames - first), wild)
+
+
+def _block(rng: np.random.Generator, first: int, n: int, wild: bool) -> FrameBlock:
+    d, c, p, o = (len(x) for x in (LAYOUT.distance_sensors, LAYOUT.capacitive_sensors, LAYOUT.pairs, LAYOUT.objects))
+
+    def numbers(*shape: int) -> np.ndarray:
+        if not wild:
+            return rng.normal(size=shape)
+        any_bits = rng.integers(0, 2**64, size=shape, dtype=np.uint64, endpoint=False).view(np.float64)
+        corner = rng.choice(np.array([np.nan, -0.0, 0.0, np.inf, -np.inf, 5e-324]), size=shape)
+        return np.where(rng.random(shape) < 0.3, corner, any_bits)
+
+    poses = transforms.from_rpy(rng.uniform(-3, 3, size=(n, len(LAYOUT.links), 3)))
+    poses[..., :3, 3] = rng.normal(size=(n, len(LAYOUT.links), 3)) * 1e3
+    status = rng.integers(0, 3, size=(n, d)).astype(np.uint8)
+    return FrameBlock(
+        layout=LAYOUT,
+        first=first,
+        time=((first + np.arange(n, dtype=np.int64)) * 50_000_000_000) // 3,
+        joint_positions=numbers(n, 2),
+        joint_velocities=numbers(n, 2),
+        link_poses=poses,
+        collision=CollisionColumns(
+            level=rng.integers(0, 3, size=(n, p)).astype(np.uint8),
+            clearance=numbers(n, p),
+            evaluated=rng.random((n, p)) < 0.5,
+            undecided=rng.random((n, p)) < 0.02,
+        ),
+        distance=DistanceColumns(
+            status=status,
+            distance=numbers(n, d),
+            point=numbers(n, d, 3),
+            point_sensor=numbers(n, d, 3),
+            normal=numbers(n, d, 3),
+            shape=rng.integers(-1, 3, size=(n, d)).astype(np.int32),
+            triangle=rng.integers(-1, 2**31 - 1, size=(n, d)).astype(np.int32),
+            case=rng.integers(0, 6, size=(n, d)).astype(np.uint8),
+        ),
+        capacitive=CapacitiveColumns(
+            capacitance=numbers(n, c),
+            per_object=numbers(n, c, o),
+            output_voltage=numbers(n, c),
+            delta_output=numbers(n, c),
+            saturated=rng.random((n, c)) < 0.1,
+            touching=rng.random((n, c)) < 0.1,
+        ),
+    )
+
+
+def described(frames: int) -> provenance.Provenance:
+    """Return the provenance of a made-up run."""
+    model = {"distance": {"method": "exact", "revision": 1}}
+    return provenance.describe("made_up", "run.yaml", FILES, frames=frames, layout=LAYOUT, model=model)

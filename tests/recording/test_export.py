@@ -1,0 +1,98 @@
+"""Exported tables read back: the same numbers, whatever they are."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from replay.errors import InvalidValue, RecordingExistsError
+from replay.recording.export import export, tables
+from replay.recording.reader import Recording, read
+from tests.recording.test_round_trip import write
+
+FRAMES = 300
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return read(write(tmp_path_factory.mktemp("export") / "made_up.mcap", FRAMES))
+
+
+def same(got: list[float], expected: np.ndarray) -> bool:
+    """Equal bit by bit, except that one NaN is as good as another."""
+    values = np.array(got, dtype=np.float64)
+    both = np.isnan(values) & np.isnan(expected)
+    return bool(((values.view(np.int64) == np.ascontiguousarray(expected).view(np.int64)) | both).all())
+
+
+def test_every_topic_is_a_table_with_units(recording: Recording) -> None:
+    found = tables(recording)
+    assert sorted(found) == sorted(
+        ["/joint_states", "/tf", "/collision", "/distance/left", "/distance/right ä", "/capacitive/guard", "/events"]
+    )
+    assert list(found["/joint_states"]) == [
+        "time [ns]",
+        "lift position [m]",
+        "lift velocity [m/s]",
+        "rotation position [rad]",
+        "rotation velocity [rad/s]",
+    ]
+    for topic, table in found.items():
+        lengths = {len(column) for column in table.values()}
+        assert lengths == {len(recording.events) if topic == "/events" else FRAMES}
+
+
+def test_csv_reads_back(recording: Recording, tmp_path: Path) -> None:
+    paths = export(recording, tmp_path, format="csv")
+    assert len(paths) == 7 and len({path.name for path in paths}) == 7
+    expected = tables(recording)["/capacitive/guard"]
+    with (tmp_path / "made_up.capacitive_guard.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == list(expected)
+    for name, column in expected.items():
+        if column.dtype == np.float64:
+            assert same([float(row[name]) for row in rows], column)
+    assert {row["saturated"] for row in rows} == {"true", "false"}
+
+
+def test_parquet_reads_back_with_provenance(recording: Recording, tmp_path: Path) -> None:
+    export(recording, tmp_path, format="parquet", topics=["/distance/*"])
+    assert len(list(tmp_path.iterdir())) == 2
+    table = pyarrow.parquet.read_table(tmp_path / "made_up.distance_left.parquet")
+    expected = tables(recording)["/distance/left"]
+    assert same(table["distance [m]"].to_pylist(), expected["distance [m]"])
+    assert table["status"].to_pylist() == expected["status"].tolist()
+    assert json.loads(table.schema.metadata[b"replay"])["scenario"] == '"made_up"'
+
+
+def test_json_reads_back_and_is_strict(recording: Recording, tmp_path: Path) -> None:
+    (path,) = export(recording, tmp_path, format="json")
+
+    def refuse(word: str) -> None:
+        raise AssertionError(f"{word} is not JSON")
+
+    document = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    assert document["provenance"]["scenario"] == "made_up"
+    expected = tables(recording)
+    assert set(document["topics"]) == set(expected)
+    for name, column in expected["/collision"].items():
+        got = document["topics"]["/collision"][name]
+        if column.dtype == np.float64:
+            assert same([float(value) for value in got], column)
+            assert {value for value in got if isinstance(value, str)} <= {"NaN", "Infinity", "-Infinity"}
+
+
+def test_what_cannot_be_exported_is_said(recording: Recording, tmp_path: Path) -> None:
+    with pytest.raises(InvalidValue, match="/distance/right"):
+        export(recording, tmp_path, format="csv", topics=["/lidar"])
+    with pytest.raises(InvalidValue, match="csv, json, parquet"):
+        export(recording, tmp_path, format="xls")  # type: ignore[arg-type]
+    export(recording, tmp_path, format="json")
+    with pytest.raises(RecordingExistsError):
+        export(recording, tmp_path, format="json")
+    export(recording, tmp_path, format="json", overwrite=True)

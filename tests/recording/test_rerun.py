@@ -1,0 +1,150 @@
+"""Rerun recordings read back: what is drawn, when, and in which colour."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from PIL import Image
+from rerun.chunk import RrdReader
+
+from replay.errors import RecordingExistsError, ViewerError
+from replay.recording.picture import picture, viewer_binary
+from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
+from replay.recording.surfaces import cone_strips, corner_normals
+from tests.recording import moving
+
+FRAMES = 300
+Rows = dict[int, list[object]]
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("rerun") / "moving.rrd"
+    writer = RerunWriter(target, moving.LAYOUT, moving.scene())
+    for block in moving.blocks(FRAMES):
+        writer.write(block)
+    writer.close()
+    return target
+
+
+@pytest.fixture(scope="module")
+def logged(path: Path) -> dict[tuple[str, str], Rows]:
+    """Return, for each entity and component, its values by frame; what does not change is at frame -1."""
+    result: dict[tuple[str, str], Rows] = {}
+    for chunk in RrdReader(str(path)).stream():
+        batch = chunk.to_record_batch()
+        names = batch.schema.names
+        frames = batch.column(names.index("frame")).to_pylist() if "frame" in names else [-1] * batch.num_rows
+        for name, column in zip(names, batch.columns, strict=True):
+            if ":" in name and pa.types.is_list(column.type):
+                rows = result.setdefault((str(chunk.entity_path), name.rpartition(":")[2]), {})
+                rows.update(zip(frames, column.to_pylist(), strict=True))
+    return result
+
+
+def blocks_of(field: str, group: str) -> np.ndarray:
+    return np.concatenate([getattr(getattr(block, group), field) for block in moving.blocks(FRAMES)])
+
+
+def test_bodies_hang_on_moving_links(logged: dict[tuple[str, str], Rows]) -> None:
+    heights = np.concatenate([block.joint_positions[:, 0] for block in moving.blocks(FRAMES)])
+    moves = logged["/scene/head", "translation"]
+    assert {frame: row[0][2] for frame, row in moves.items()} == {  # type: ignore[index]
+        frame: pytest.approx(height, abs=1e-6) for frame, height in enumerate(heights.tolist())
+    }
+    assert list(logged["/scene/table", "translation"]) == [0], "a link that stands is placed once"
+    positions = logged["/scene/table/body", "vertex_positions"][-1]
+    assert np.allclose(np.array(positions).reshape(-1, 3, 3), moving.scene().bodies[2].triangles, atol=1e-6)
+
+
+def test_bodies_are_coloured_by_their_worst_pair(logged: dict[tuple[str, str], Rows]) -> None:
+    level = blocks_of("level", "collision")
+    palette = {0: moving.scene().bodies[0].color, **LEVEL_COLORS}
+
+    def packed(value: int) -> int:
+        red, green, blue, alpha = palette[value]
+        return red << 24 | green << 16 | blue << 8 | alpha
+
+    for entity, worst in (("/scene/head/housing", level.max(axis=1)), ("/scene/table/top", level[:, 1])):
+        rows = logged[entity, "albedo_factor"]
+        changes = [0, *(np.flatnonzero(np.diff(worst)) + 1).tolist()]
+        assert sorted(rows) == changes, entity
+        if entity == "/scene/head/housing":
+            assert [rows[k] for k in changes] == [[packed(int(worst[k]))] for k in changes]
+            assert {int(worst[k]) for k in changes} == {0, 1, 2}
+    assert list(logged["/scene/room/stand", "albedo_factor"]) == [-1], "a body in no pair keeps its colour"
+
+
+def test_beams_are_drawn_while_something_is_seen(logged: dict[tuple[str, str], Rows]) -> None:
+    seen = blocks_of("status", "distance")[:, 0] > 0
+    strips = logged["/scene/closest_points/down", "strips"]
+    for frame, strip in strips.items():
+        assert bool(strip) == seen[frame]
+    shown = np.array([bool(strips[max(k for k in strips if k <= frame)]) for frame in range(FRAMES)])
+    assert np.array_equal(shown, seen) and 0 < seen.sum() < FRAMES
+    some = next(frame for frame in strips if seen[frame])
+    heights = np.concatenate([block.joint_positions[:, 0] for block in moving.blocks(FRAMES)])
+    assert np.allclose(strips[some][0], [[0, 0, heights[some] - 0.1], [0, 0, 1.25]], atol=1e-6)  # type: ignore[index]
+
+
+def test_curves_have_a_gap_where_there_is_no_value(logged: dict[tuple[str, str], Rows]) -> None:
+    expected = blocks_of("clearance", "collision")[:, 0]
+    entity = next(name for name, component in logged if name.startswith("/clearance/") and component == "scalars")
+    curve = logged[entity, "scalars"]
+    for frame, value in enumerate(expected):
+        if not np.isnan(value):
+            assert curve[frame] == [value]
+    gaps = [frame for frame, value in curve.items() if np.isnan(value[0])]  # type: ignore[index]
+    ends = np.flatnonzero(~np.isnan(expected[:-1]) & np.isnan(expected[1:])) + 1
+    assert gaps == ends.tolist() != []
+    texts = [row[0] for row in logged["/events", "text"].values()]  # type: ignore[index]
+    assert any("contact begins: head/housing|table/body" in text for text in texts)
+    assert "name: moving" in logged["/scenario", "text"][-1][0]  # type: ignore[index]
+
+
+def test_an_existing_recording_stays(path: Path) -> None:
+    with pytest.raises(RecordingExistsError):
+        RerunWriter(path, moving.LAYOUT, moving.scene())
+
+
+def test_normals_are_smooth_on_a_barrel_and_sharp_on_a_box() -> None:
+    box = moving.box((1, 2, 3), (0, 0, 0))
+    across = np.cross(box[:, 1] - box[:, 0], box[:, 2] - box[:, 0])
+    face = across / np.linalg.norm(across, axis=1, keepdims=True)
+    assert np.allclose(corner_normals(box), face[:, None])
+    barrel = moving.barrel(0.2, 1.0)
+    normals = corner_normals(barrel)
+    side = np.abs(normals[..., 1]) < 0.5
+    radial = barrel[..., [0, 2]] / 0.2
+    assert np.allclose(normals[side][:, [0, 2]], radial[side], atol=np.pi / 32)  # half a segment
+
+
+def test_cones_have_their_aperture_and_range() -> None:
+    cone = moving.scene().cones[0]
+    apex = cone.T_link_sensor[:3, 3]
+    axis = cone.T_link_sensor[:3, 2]
+    ends = np.concatenate([strip[-1:] for strip in cone_strips(cone)]) - apex
+    assert np.allclose(np.linalg.norm(ends, axis=1), cone.range)
+    assert np.allclose(np.arccos(ends @ axis / cone.range), cone.aperture / 2)
+
+
+@pytest.mark.skipif(not list(Path("/usr/share/vulkan/icd.d").glob("*.json")), reason="needs a Vulkan driver")
+def test_the_viewer_shows_contact_in_red(path: Path, tmp_path: Path) -> None:
+    picture(path, tmp_path / "contact.png", at=2.5, size=(1000, 700))
+    with Image.open(tmp_path / "contact.png") as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    scene = pixels[:, : pixels.shape[1] // 2]
+    red = (scene[..., 0] > 120) & (scene[..., 1] < 70) & (scene[..., 2] < 70)
+    assert red.mean() > 0.01
+    running = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
+    assert str(path) not in running, "the viewer must not outlive the picture"
+
+
+def test_pictures_of_nothing_are_refused(tmp_path: Path) -> None:
+    assert viewer_binary().is_file()
+    with pytest.raises(ViewerError, match="no such file"):
+        picture(tmp_path / "none.rrd", tmp_path / "none.png")

@@ -1,0 +1,207 @@
+"""The plate integral: high-precision references, invariances, continuity, contact, convergence."""
+
+import json
+import math
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from replay.errors import InvalidValue
+from replay.sensing.capacitive import plate_integral
+from tests.sensing import plate_cases, plate_reference
+
+_HARD_CASES = Path(__file__).parent.parent / "data" / "plate_integral.json"
+_TOLERANCE = 3e-14  # measured worst of 10 000 cases of 21 families: 7e-15 (close)
+
+
+def _error(value: float, expected: mp.mpf) -> float:
+    return abs(float((mp.mpf(float(value)) - expected) / expected)) if expected else abs(float(value))
+
+
+def test_hard_cases():
+    cases = json.loads(_HARD_CASES.read_text())["cases"]
+    with mp.workdps(30):
+        for case in cases:
+            value = plate_integral([case["triangle"]], case["half_size"], side=case["side"])[0]
+            assert _error(value, mp.mpf(case["integral"])) <= 1e-14, case
+
+
+@pytest.mark.parametrize("family", plate_cases.FAMILIES)
+def test_random_families_agree_with_60_digits(family):
+    rng = np.random.default_rng(3)
+    for _ in range(12):
+        triangle, half_size, side = plate_cases.case(family, rng)
+        value = plate_integral([triangle], half_size, side=side)[0]
+        expected = plate_reference.plate_integral(triangle.tolist(), half_size.tolist(), side)
+        assert _error(value, expected) <= _TOLERANCE, (triangle.tolist(), half_size.tolist(), side)
+
+
+def _cases(count: int, seed: int, families=("random", "spans_all", "crosses_plane", "close", "on_border")):
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        yield plate_cases.case(families[k % len(families)], rng), rng
+
+
+def test_mirrored_swapped_and_permuted_triangles_have_the_same_integral():
+    for (triangle, half, side), rng in _cases(200, 5):
+        value = plate_integral([triangle], half, side=side)[0]
+        mirrored = triangle * [-1, 1, 1]
+        swapped = triangle[:, [1, 0, 2]]
+        permuted = triangle[rng.permutation(3)]
+        same = [
+            plate_integral([mirrored], half, side=side)[0],
+            plate_integral([swapped], half[::-1], side=side)[0],
+            plate_integral([permuted], half, side=side)[0],
+        ]
+        if side == "both":
+            same.append(plate_integral([triangle * [1, 1, -1]], half, side=side)[0])
+        np.testing.assert_allclose(same, value, rtol=3e-14)
+
+
+def test_the_integral_scales_like_a_length():
+    for (triangle, half, side), _ in _cases(100, 6):
+        value = plate_integral([triangle], half, side=side)[0]
+        assert plate_integral([triangle * 1024.0], half * 1024.0, side=side)[0] == 1024.0 * value
+        assert plate_integral([triangle * 1e-3], half * 1e-3, side=side)[0] == pytest.approx(1e-3 * value, rel=1e-12)
+
+
+def test_pieces_of_a_triangle_add_up_to_it():
+    for (triangle, half, side), rng in _cases(200, 7, ("random", "spans_all", "crosses_plane")):
+        a, b, c = triangle
+        s, t, r = rng.uniform(0.05, 0.95, 3)
+        d, e, f = a + s * (b - a), b + t * (c - b), c + r * (a - c)
+        pieces = [[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+        value = plate_integral([triangle], half, side=side)[0]
+        assert plate_integral(pieces, half, side=side).sum() == pytest.approx(value, rel=1e-12)
+
+
+def test_no_jump_across_a_border_of_the_regions():
+    half = np.array([0.05, 0.03])
+    triangle = np.array([[-0.02, -0.01, 0.04], [0.03, 0.0, 0.06], [0.0, 0.02, 0.05]])
+    size = np.abs(triangle).max()
+    for axis in range(2):
+        for corner in range(3):
+            start = triangle.copy()
+            start[:, axis] += half[axis] - triangle[corner, axis]
+            steps = np.arange(-20, 21)[:, None, None] * 1e-9 * np.eye(3)[axis]
+            values = plate_integral(start + steps, half)
+            assert (np.abs(np.diff(values)) <= values.max() * 1e-9 / (0.04 - 1e-7) + 1e-15 * size).all()
+            assert np.abs(np.diff(values, 3)).max() <= 1e-13 * values.max()
+
+
+def test_readings_grow_steadily_towards_contact_and_are_finite_until_then():
+    half = np.array([0.05, 0.03])
+    flat = np.array([[-0.2, -0.2, 0.0], [0.2, -0.2, 0.0], [0.0, 0.3, 0.0]])
+    tilted = flat + np.array([[0, 0, 0.0], [0, 0, 0.1], [0, 0, 0.2]])
+    beside = np.array([[0.05, -0.02, 0.0], [0.05, 0.02, 0.0], [0.2, 0.0, 0.1]])
+    heights = 10.0 ** np.arange(-1, -13, -1.0)
+    for triangle, step in ((flat, [0, 0, 1]), (tilted, [0, 0, 1]), (beside, [1, 0, 0])):
+        for side in ("front", "both"):
+            values = plate_integral(triangle + heights[:, None, None] * step, half, side=side)
+            assert np.isfinite(values).all()
+            assert (np.diff(values) > 0).all()
+            assert (values > 0).all()
+
+
+_CONTACTS = {
+    # name: (corners in units of the half sizes, front is infinite, both is infinite)
+    "coplanar on the plate": ([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0, 0.5, 0]], False, True),
+    "coplanar around the plate": ([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], False, True),
+    "coplanar beside": ([[2, 0, 0], [3, 1, 0], [3, -1, 0]], False, False),
+    "coplanar, edge on the plate's edge": ([[1, 0.5, 0], [1, -0.5, 0], [3, 0, 0]], False, True),
+    "coplanar, edge beyond the plate's edge": ([[1, 5, 0], [1, 2, 0], [3, 0, 0]], False, False),
+    "coplanar, corner on the plate's edge": ([[1, 0.5, 0], [2, 1, 0], [2, -1, 0]], False, False),
+    "coplanar, corner on corner": ([[1, 1, 0], [2, 1.5, 0], [2, 3, 0]], False, False),
+    "coplanar, edge through the plate's corner": ([[2, 0, 0], [0, 2, 0], [3, 3, 0]], False, False),
+    "slanted, edge on the plate's edge": ([[1, 0.5, 0], [1, -0.5, 0], [3, 0, 2]], True, True),
+    "upright, edge on the plate's edge": ([[1, 0.5, 0], [1, -0.5, 0], [1, 0, 2]], True, True),
+    "upright, edge beyond the plate's edge": ([[1, 5, 0], [1, 2, 0], [1, 0, 2]], False, False),
+    "slanted, edge on the plate": ([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.5, 1]], True, True),
+    "slanted, edge through the plate's corner": ([[2, 0, 0], [0, 2, 0], [3, 3, 1]], False, False),
+    "below, edge on the plate": ([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.5, -1]], False, True),
+    "corner on the plate": ([[0.2, 0.1, 0], [0.5, 0, 1], [0, 0.5, 1]], False, False),
+    "corner on the plate's corner": ([[1, 1, 0], [2, 0, 1], [0, 2, 1]], False, False),
+    "corner on the plate's edge": ([[1, 0.3, 0], [2, 0, 1], [0, 2, 1]], False, False),
+    "crossing through the plate": ([[0, 0, -1], [0.3, 0, 1], [0, 0.3, 1]], True, True),
+    "crossing along the plate, beside it": ([[-30, 2, -1], [-30, 2, 2], [40, 2.1, 0.5]], False, False),
+    "crossing along the plate, through it": ([[-30, 0.1, -1], [-30, 0.1, 2], [40, -0.1, 0.5]], True, True),
+    "crossing through the plate's border line": ([[1, 0.5, -1], [1, 0.5, 1], [1, -0.5, 1]], True, True),
+    "crossing on the border line beside the edge": ([[1, 2, -1], [1, 2, 1], [1, 4, 1]], False, False),
+    "crossing beside": ([[2, 0, -1], [2, 0.3, 1], [2.5, 0.3, 1]], False, False),
+    "crossing at the plate's corner only": ([[2, 0, -1], [2, 0, 1], [0, 2, 0.0]], False, False),
+    "crossing through a corner of its own": ([[0.2, 0.1, 0], [0.5, 0, 1], [0, 0.5, -1]], True, True),
+    "no area, through the plate": ([[0, 0, -1], [0, 0, 1], [0, 0, 2]], False, False),
+}
+
+
+@pytest.mark.parametrize("name", _CONTACTS)
+@pytest.mark.parametrize("method", ["exact", "midpoint"])
+def test_the_integral_is_infinite_exactly_when_more_than_one_point_is_shared(name, method):
+    corners, front, both = _CONTACTS[name]
+    for half in ([0.05, 0.03], [0.1, 0.7], [1 / 3, 1e-3]):
+        rng = np.random.default_rng(1)
+        for _ in range(3):
+            triangle = (np.array(corners, dtype=float) * [*half, 0.3])[rng.permutation(3)]
+            for side, expected in (("front", front), ("both", both)):
+                value = plate_integral([triangle], half, side=side, method=method)[0]
+                assert math.isinf(value) == expected
+                assert value >= 0.0
+
+
+def test_finite_integrals_of_touching_triangles_have_their_closed_form():
+    # a corner on the plate's edge, coplanar beside it: width w(u) = 2 u / 3, integral of w/u over 0..3 is 2
+    triangle = [[0.05, 0.0, 0.0], [3.05, 1.0, 0.0], [3.05, -1.0, 0.0]]
+    assert plate_integral([triangle], [0.05, 2.0], side="both")[0] == pytest.approx(2.0, rel=1e-14)
+    # a corner on the plate, standing on it: width w(z) = z, integral of w/z over 0..1 is 1, area element 1
+    triangle = [[0.0, 0.0, 0.0], [-0.5, 0.0, 1.0], [0.5, 0.0, 1.0]]
+    assert plate_integral([triangle], [2.0, 2.0])[0] == pytest.approx(1.0, rel=1e-15)
+
+
+def test_midpoint_converges_to_exact_with_second_order():
+    rng = np.random.default_rng(2)
+    triangles, halves = zip(*[plate_cases.case("random", rng)[:2] for _ in range(20)], strict=True)
+    errors = []
+    for splits in range(2, 7):
+        pairs = [
+            (plate_integral([t], h, method="midpoint", splits=splits)[0], plate_integral([t], h)[0])
+            for t, h in zip(triangles, halves, strict=True)
+        ]
+        errors.append(np.median([abs(m - e) / e for m, e in pairs]))
+    orders = -np.diff(np.log2(errors))
+    assert ((orders > 1.5) & (orders < 2.5)).all()
+
+
+def test_midpoint_takes_region_and_side_at_the_centroid():
+    triangle = np.array([[0.0, 0.0, -0.1], [0.3, 0.0, 0.2], [0.0, 0.3, 0.2]])
+    centroid, area = triangle.mean(axis=0), 0.5 * np.linalg.norm(np.cross(*(triangle[1:] - triangle[0])))
+    distance = np.linalg.norm([centroid[0] - 0.01, centroid[1] - 0.02, centroid[2]])
+    shifted = plate_integral([triangle], [0.01, 0.02], method="midpoint", splits=0)
+    assert shifted[0] == pytest.approx(area / distance, rel=1e-14)
+    assert plate_integral([triangle - [0, 0, 0.15]], [0.01, 0.02], method="midpoint", splits=0)[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"triangles": np.zeros((3, 3))}, "triangles"),
+        ({"triangles": np.full((1, 3, 3), np.nan)}, "triangles"),
+        ({"half_size": [0.1]}, "half_size"),
+        ({"half_size": [0.1, 0.0]}, "half_size"),
+        ({"half_size": [0.1, np.inf]}, "half_size"),
+        ({"side": "back"}, "side"),
+        ({"method": "tree"}, "method"),
+        ({"method": "midpoint", "splits": 13}, "splits"),
+        ({"method": "midpoint", "splits": 1.5}, "splits"),
+    ],
+)
+def test_bad_arguments_are_named(changes, name):
+    arguments = {"triangles": np.eye(3)[None], "half_size": [0.1, 0.1], **changes}
+    with pytest.raises(InvalidValue) as error:
+        plate_integral(arguments.pop("triangles"), arguments.pop("half_size"), **arguments)
+    assert error.value.name == name
+
+
+def test_no_triangles_give_no_integrals():
+    assert plate_integral(np.empty((0, 3, 3)), [0.1, 0.1]).shape == (0,)
