@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.bodies import AABB, SPHERE, Volumes
+from replay.collision.leaf import leaf
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.numerics.jit import kernel
 
@@ -32,7 +33,7 @@ _SLACK = 2.0**-44
 """Relative to the lengths that enter a distance of spheres: far above their rounding."""
 
 
-@kernel
+@leaf
 def spread(poses: Floats) -> tuple[float, float]:
     """Return how far (n, 4, 4) poses are from the middle one: max |t_f - t_m| [m] and max |R_f - R_m| [-]."""
     n = len(poses)
@@ -48,7 +49,7 @@ def spread(poses: Floats) -> tuple[float, float]:
     return math.sqrt(shift), math.sqrt(turn)
 
 
-@kernel
+@leaf
 def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
     """Return a lower bound on the distance [m] of two bodies, from their spheres, b's link at pose (4, 4) in a's."""
     c, o = volumes.center[b], volumes.center[a]
@@ -57,10 +58,11 @@ def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
         x = pose[i, 0] * c[0] + pose[i, 1] * c[1] + pose[i, 2] * c[2] + pose[i, 3] - o[i]
         square += x * x
         size += abs(pose[i, 3]) + abs(c[i]) + abs(o[i])
-    return math.sqrt(square) - volumes.radius[a] - volumes.radius[b] - _SLACK * size
+    gap: float = math.sqrt(square) - volumes.radius[a] - volumes.radius[b] - _SLACK * size
+    return gap
 
 
-@kernel
+@leaf
 def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, scratch: Floats) -> bool:
     """Return whether two bodies' volumes meet; errs only towards meeting.
 
@@ -136,11 +138,11 @@ def sieve(
                 level[f, p], task[f, p] = 0, SKIP
             continue
         for f in range(n):
-            if f > 0 and _same(poses[q, f], poses[q, f - 1]):
-                if volumes.kind != AABB or _same(turns[link, f], turns[link, f - 1]):
-                    counts[BY_REPEAT] += 1
-                    level[f, p], task[f, p] = level[f - 1, p], REPEAT
-                    continue
+            repeats = f > 0 and _same(poses[q, f], poses[q, f - 1])
+            if repeats and (volumes.kind != AABB or _same(turns[link, f], turns[link, f - 1])):
+                counts[BY_REPEAT] += 1
+                level[f, p], task[f, p] = level[f - 1, p], REPEAT
+                continue
             level[f, p], task[f, p] = 0, SKIP
             if sphere_gap(volumes, a, b, poses[q, f]) > limit:
                 counts[BY_SPHERE] += 1
@@ -152,7 +154,7 @@ def sieve(
                 counts[BY_VOLUME] += 1
 
 
-@kernel
+@leaf
 def _same(a: Floats, b: Floats) -> bool:
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision import double_double as dd
-from replay.numerics.jit import kernel
+from replay.collision.leaf import leaf
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
 
 
-@kernel
+@leaf
 def corner(points: Floats, i: int) -> dd.Vector:
     """Return point i of points (4, 3, 2) as a vector of double-doubles."""
     return (
@@ -34,7 +34,7 @@ def corner(points: Floats, i: int) -> dd.Vector:
     )
 
 
-@kernel
+@leaf
 def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
     """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
 
@@ -109,7 +109,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
     return False, best_point, best
 
 
-@kernel
+@leaf
 def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     """Return whether the origin is inside the tetrahedron beyond the rounding error of 2^-100; if so, its weights."""
     p, q, r, s = corner(points, 0), corner(points, 1), corner(points, 2), corner(points, 3)
@@ -123,6 +123,6 @@ def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit
 
 
-@kernel
+@leaf
 def _sum(u: dd.Vector, v: dd.Vector) -> dd.Vector:
     return dd.add(u[0], v[0]), dd.add(u[1], v[1]), dd.add(u[2], v[2])

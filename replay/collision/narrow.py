@@ -19,8 +19,8 @@ Flags = NDArray[np.bool_]
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
-"""Rows of the counters after those of `traversal`: pair-frames looked at, contacts found by containment alone, contacts,
-and pair-frames that stayed undecided."""
+"""Rows of the counters after those of `traversal`: pair-frames looked at, contacts found by containment alone,
+contacts, and pair-frames that stayed undecided."""
 
 
 @kernel
@@ -46,7 +46,7 @@ def decide(
         undecided: in False, out.
         counts: (COUNTS,) added to.
     """
-    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16))
+    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
     nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(pairs)):
@@ -66,9 +66,7 @@ def decide(
                 for j in range(3):
                     rotation[i, j] = poses[q, f, i, j]
             counts[RUNS] += 1
-            status, distance = closest(
-                bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts[: traversal.COUNTS]
-            )
+            status, distance = closest(bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts)
             if status == SEPARATED and level[f, p] > 0:
                 held = bodies.surface[a] and contains_part(bodies, a, b, rotation, translation, False)
                 held = held or (bodies.surface[b] and contains_part(bodies, b, a, rotation, translation, True))

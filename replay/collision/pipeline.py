@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -14,6 +14,7 @@ from replay.collision import broad, narrow, traversal
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.columns import CollisionColumns
 from replay.collision.pairs import CollisionBody, Pair
+from replay.collision.relative import RelativePoses
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import Linkage, LinkPoses
 
@@ -78,7 +79,8 @@ class NarrowPhase(Protocol):
         clearance: Floats,
         undecided: NDArray[np.bool_],
         counts: Integers,
-    ) -> None: ...
+    ) -> None:
+        """Finish level, clearance and undecided where task asks for it."""
 
 
 class CollisionPipeline:
@@ -129,6 +131,9 @@ class CollisionPipeline:
         self._static = np.array([pair.static for pair in self.pairs], dtype=bool)
         if bounds == "aabb":  # their boxes turn with their common base
             self._static[:] = False
+        self._linkage = linkage
+        self._moving = self._grouped(np.flatnonzero(~self._static))
+        self._fixed = self._grouped(np.flatnonzero(self._static))
         self._static_columns: CollisionColumns | None = None
         self._decide: NarrowPhase | None = None
         if chosen:
@@ -139,73 +144,68 @@ class CollisionPipeline:
     def run(self, poses: LinkPoses) -> CollisionColumns:
         """Return the columns of a block of n frames; they depend on no other block.
 
+        Raises:
+            InvalidValue: a pose is not finite.
+
         Accuracy: a clearance is right to 1e-12 of itself plus 1e-14 of the bodies' reach and offset
         (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does.
         """
         n, count = len(poses.local), len(self.pairs)
+        if not np.isfinite(poses.local).all():
+            frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
+            place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
+            raise InvalidValue(place, poses.local[frame, link].tolist(), "link poses must be finite")
         self.counters.pair_frames += n * count
         columns = _empty(n, count)
-        moving = np.flatnonzero(~self._static)
-        fixed = np.flatnonzero(self._static)
         if n == 0:
             return columns
-        if len(fixed):
+        if self._fixed:
             if self._static_columns is None:
-                self._static_columns = _empty(1, len(fixed))
-                self._evaluate(poses.slice(0, 1), fixed, self._static_columns, np.arange(len(fixed)))
-            self.counters.static += n * len(fixed)
-            _copy(self._static_columns, columns, fixed)
-        self._evaluate(poses, moving, columns, moving)
+                self._static_columns = _empty(1, count)
+                self._evaluate(self._fixed, poses.slice(0, 1), self._static_columns)
+            self.counters.static += n * self.counters.static_pairs
+            _copy(self._static_columns, columns, np.flatnonzero(self._static))
+        self._evaluate(self._moving, poses, columns)
         return columns
 
-    def _evaluate(self, poses: LinkPoses, chosen: Integers, columns: CollisionColumns, target: Integers) -> None:
-        """Compute pairs `chosen` for all frames into the columns `target`, a bounded number of link pairs at a time."""
-        n = len(poses.local)
-        for part, links in self._groups(chosen):
-            relative = np.empty((len(links), n, 4, 4))
-            for q, (a, b) in enumerate(links):
-                relative[q] = poses.relative(a, b)
-            bases = sorted({a for a, _ in links}) if self._uses_world else []
-            turns = np.empty((max(1, len(bases)), n if self._uses_world else 0, 3, 3))
-            for k, link in enumerate(bases):
-                turns[k] = poses.world[:, link, :3, :3]
-            link_row = {pair: q for q, pair in enumerate(links)}
-            base_row = {link: k for k, link in enumerate(bases)}
-            rows = np.empty((len(part), 4), dtype=np.int64)
-            for k, pair in enumerate(part):
-                a, b = self._rows[pair]
-                links_of = (self._links[a], self._links[b])
-                rows[k] = a, b, link_row[links_of], base_row.get(links_of[0], 0)
-            self._run_kernels(rows, relative, turns, columns, target[np.searchsorted(chosen, part)])
+    def _evaluate(self, groups: Sequence[_Group], poses: LinkPoses, columns: CollisionColumns) -> None:
+        for group in groups:
+            relative = group.relative.of(poses.local)
+            turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
+            if self._uses_world:
+                turns = np.ascontiguousarray(np.moveaxis(poses.world[:, group.bases, :3, :3], 1, 0))
+            self._run_kernels(group, relative, turns, columns)
 
-    def _run_kernels(
-        self, rows: Integers, relative: Floats, turns: Floats, columns: CollisionColumns, target: Integers
-    ) -> None:
+    def _run_kernels(self, group: _Group, relative: Floats, turns: Floats, columns: CollisionColumns) -> None:
         assert self._decide is not None
-        n, count = relative.shape[1], len(rows)
+        rows, n, count = group.rows, relative.shape[1], len(group.rows)
         part = _empty(n, count)
         task = np.zeros((n, count), dtype=np.uint8)
         sieved = np.zeros(broad.COUNTS, dtype=np.int64)
         decided = np.zeros(narrow.COUNTS, dtype=np.int64)
-        if turns.shape[1] == 0:  # not read
-            turns = np.zeros((1, n, 3, 3))
         broad.sieve(self._volumes, rows, relative, turns, self._limit, part.level, task, sieved)
         self._decide(rows, relative, self._limit, task, part.level, part.clearance, part.undecided, decided)
         part.evaluated[:] = ~np.isnan(part.clearance)
         for name in ("level", "clearance", "evaluated", "undecided"):
-            getattr(columns, name)[:, target] = getattr(part, name)
+            getattr(columns, name)[:, group.pairs] = getattr(part, name)
         self._count(sieved.tolist(), decided.tolist())
 
-    def _groups(self, chosen: Integers) -> Iterator[tuple[list[int], list[tuple[int, int]]]]:
-        """Yield pairs and the link pairs they need, at most LINK_PAIRS_AT_ONCE of these a group."""
+    def _grouped(self, chosen: Integers) -> list[_Group]:
+        """Return pairs in groups that share link pairs, at most LINK_PAIRS_AT_ONCE of these a group."""
         by_links: dict[tuple[int, int], list[int]] = {}
         for pair in chosen.tolist():
             a, b = self._rows[pair]
             by_links.setdefault((self._links[a], self._links[b]), []).append(pair)
-        links = list(by_links)
+        groups, links = [], list(by_links)
         for begin in range(0, len(links), LINK_PAIRS_AT_ONCE):
-            group = links[begin : begin + LINK_PAIRS_AT_ONCE]
-            yield sorted(pair for key in group for pair in by_links[key]), group
+            part = links[begin : begin + LINK_PAIRS_AT_ONCE]
+            bases = sorted({a for a, _ in part})
+            base_row = {link: k if self._uses_world else 0 for k, link in enumerate(bases)}
+            entries = sorted((pair, q, base_row[key[0]]) for q, key in enumerate(part) for pair in by_links[key])
+            rows = np.array([[*self._rows[pair], q, base] for pair, q, base in entries], dtype=np.int64)
+            pairs = np.array([pair for pair, _, _ in entries], dtype=np.int64)
+            groups.append(_Group(pairs, rows, RelativePoses(self._linkage, part), bases))
+        return groups
 
     def _count(self, sieved: list[int], decided: list[int]) -> None:
         counters = self.counters
@@ -221,6 +221,16 @@ class CollisionPipeline:
         counters.contained += decided[narrow.SEEN_INSIDE]
         counters.contacts += decided[narrow.CONTACTS]
         counters.undecided += decided[narrow.UNDECIDEDS]
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Pairs evaluated together: `rows` for `broad.sieve`, their relative poses, the links of their first bodies."""
+
+    pairs: Integers
+    rows: Integers
+    relative: RelativePoses
+    bases: list[int]
 
 
 def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies) -> NarrowPhase:
@@ -255,4 +265,4 @@ def _empty(n: int, count: int) -> CollisionColumns:
 
 def _copy(source: CollisionColumns, columns: CollisionColumns, target: Integers) -> None:
     for name in ("level", "clearance", "evaluated", "undecided"):
-        getattr(columns, name)[:, target] = getattr(source, name)[0]
+        getattr(columns, name)[:, target] = getattr(source, name)[0, target]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from replay.numerics.jit import kernel
+from replay.collision.leaf import leaf
 
 Point = tuple[float, float, float]
 Near2 = tuple[Point, float, float]
@@ -31,25 +31,25 @@ DETERMINANT_ERROR = 64.0 * 2.0**-53
 """Bound of the rounding error of D_ijk over size max|p|^2; each product, each sum and each p_i contributes."""
 
 
-@kernel
+@leaf
 def dot(u: Point, v: Point) -> float:
     """Return the inner product."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@kernel
+@leaf
 def cross(u: Point, v: Point) -> Point:
     """Return the vector product."""
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
-@kernel
+@leaf
 def difference(u: Point, v: Point) -> Point:
     """Return u - v."""
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
-@kernel
+@leaf
 def nearest_on_segment(a: Point, b: Point) -> Near2:
     """Return the point of the segment ab nearest to the origin, and the weights of a and b."""
     e = difference(b, a)
@@ -66,7 +66,7 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
     return (b[0] - s * e[0], b[1] - s * e[1], b[2] - s * e[2]), s, t
 
 
-@kernel
+@leaf
 def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
     """Return the point of the triangle abc nearest to the origin, and the weights of a, b and c."""
     u, v = difference(b, a), difference(c, a)
@@ -103,7 +103,7 @@ def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
     return (n[0] * distance, n[1] * distance, n[2] * distance), 1.0 - weight_b - weight_c, weight_b, weight_c
 
 
-@kernel
+@leaf
 def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     """Let the three edges of a triangle compete: for one that is degenerate or contradicts itself."""
     point, wa, wb = nearest_on_segment(a, b)
@@ -117,7 +117,7 @@ def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     return point, wa, wb, wc
 
 
-@kernel
+@leaf
 def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
     """Return (OUTSIDE | INSIDE | UNSURE, point, weights of a, b, c, d).
 
