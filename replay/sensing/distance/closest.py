@@ -48,14 +48,14 @@ def closest_in_cone(
         range: largest distance that is sensed [m], 0 to inf.
 
     Returns:
-        `ConeHit`; an apex on a triangle (within 40 ulps of its farthest corner) reads 0.
+        `ConeHit`; an apex on a triangle, to the rounding of its corners, reads 0.
 
     Raises:
         InvalidValue: wrong shape, a value that is not finite, a zero axis, an aperture or range out of bounds.
 
     Accuracy: 1e-11 of the farthest corner against a search without closed forms, on all families of hard cases
         (tests/sensing/distance/test_cone_search.py); hit or miss differs only within 1e-12 of grazing.
-    Source: derived in `replay.sensing.distance.cone`.
+    Source: derived in `replay.sensing.distance.triangle` and `edge`.
     """
     corners = _finite("triangles", triangles)
     if corners.ndim != 3 or corners.shape[1:] != (3, 3):

@@ -25,14 +25,15 @@ from numpy.typing import NDArray
 
 from replay.geometry.tree import Tree
 from replay.numerics.jit import kernel
-from replay.sensing.distance.cone import EPSILON, Cone, closest_on_triangle
+from replay.sensing.distance.cone import EPSILON, TOUCH, Cone
+from replay.sensing.distance.triangle import closest_on_triangle
 from replay.sensing.distance.vectors import Vector, cross, dot, norm, subtract
 
 Array = NDArray[np.float64]
 
 LARGEST = float(np.finfo(np.float64).max)
 
-SLACK = 128.0 * EPSILON
+SLACK = 2.0 * TOUCH
 """Rounding of any distance in a query, as part of the farthest coordinate seen from the apex."""
 
 

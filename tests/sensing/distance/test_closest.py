@@ -112,12 +112,20 @@ def test_half_space_is_closed():
 
 @pytest.mark.parametrize("gap", [0.0, 1e-17, 1e-14, -1e-14])
 def test_apex_on_or_just_off_a_surface(gap):
-    floor = np.array([[[-0.5, -0.5, gap], [0.5, -0.5, gap], [0.0, 0.5, gap]]])
+    floor = np.array([[[-3.0, -3.0, gap], [3.0, -3.0, gap], [0.0, 3.0, gap]]])
     ahead = closest_in_cone(floor, [0, 0, 0], [0, 0, 1], 1.0)
     if gap < 0.0:
         assert not ahead.detected
     else:
-        assert ahead.distance == pytest.approx(gap, abs=1e-15)
+        assert ahead.distance == gap
+
+
+def test_apex_rounded_onto_a_small_triangle_reads_zero_whichever_way_it_faces():
+    rng = np.random.default_rng(8)
+    for axis in rng.normal(size=(200, 3)):
+        corners = 4.0 * rng.normal(size=3) + 0.3 * rng.normal(size=(3, 3))
+        apex = rng.dirichlet((1.0, 1.0, 1.0)) @ corners
+        assert closest_in_cone([corners], apex, axis, 0.5).distance == 0.0
 
 
 def test_distance_never_grows_with_the_aperture():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from replay.numerics.jit import kernel
-from replay.sensing.distance.cone import CONIC_BORDER, EDGE_BORDER, Cone, closest_on_triangle, half_angle
+from replay.sensing.distance.cone import CONIC_BORDER, EDGE_BORDER, Cone, half_angle
+from replay.sensing.distance.triangle import closest_on_triangle
 from tests.sensing.distance.cone_families import FAMILIES
 from tests.sensing.distance.cone_search import search_all
 
