@@ -1,4 +1,4 @@
-"""Gauss-Legendre nodes and weights on [0, 1], as frozen constants of the kernels.
+"""Gauss-Legendre nodes and weights on [0, 1], and symmetric rules on the triangle, as frozen constants of the kernels.
 
 Computed with 40 digits and rounded once; NumPy finds them by an eigenvalue solver, whose last digit depends on the
 processor. n nodes integrate polynomials of degree 2 n - 1 exactly.
@@ -6,7 +6,10 @@ processor. n nodes integrate polynomials of degree 2 n - 1 exactly.
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
+from numpy.typing import NDArray
 
 NODES_4 = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263])
 WEIGHTS_4 = np.array([0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692])
@@ -106,3 +109,27 @@ WEIGHTS_16 = np.array(
         0.013576229705877048,
     ]
 )
+
+
+def _symmetric_rule(centre: float, *orbits: tuple[float, ...]) -> NDArray[np.float64]:
+    """Return (k, 4) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
+    rows = [(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, centre)]
+    for weight, *place in orbits:
+        point = (1.0 - 2.0 * place[0], place[0], place[0]) if len(place) == 1 else (*place, 1.0 - place[0] - place[1])
+        rows += [(*corners, weight) for corners in sorted(set(permutations(point)))]
+    return np.array(rows)
+
+
+TRIANGLE_7 = _symmetric_rule(
+    9.0 / 40.0, (0.13239415278850618, 0.47014206410511505), (0.12593918054482717, 0.10128650732345633)
+)
+"""Means over a triangle, polynomials of degree 5 exactly (Radon 1948)."""
+
+TRIANGLE_16 = _symmetric_rule(
+    0.14431560767778717,
+    (0.09509163426728462, 0.4592925882927232),
+    (0.10321737053471824, 0.1705693077517602),
+    (0.03245849762319808, 0.05054722831703098),
+    (0.027230314174434993, 0.008394777409957605, 0.2631128296346381),
+)
+"""Means over a triangle, polynomials of degree 8 exactly (Dunavant 1985, refined to 40 digits)."""

@@ -2,5 +2,7 @@
 
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import plate_integral
+from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
+from replay.sensing.capacitive.suite import CapacitiveSuite
 
-__all__ = ["output_voltage", "plate_integral"]
+__all__ = ["CapacitiveSensor", "CapacitiveSuite", "Plate", "output_voltage", "plate_integral"]

@@ -40,6 +40,7 @@ COLUMNS = 12
 rounding took from a distance is LOW columns behind it."""
 
 NONE = -1
+_SEVERAL = 2
 _ROUNDING_SHARE = 1e-12
 SCRATCH = (4, 12, COLUMNS)
 """Shape of the scratch memory of `integral_over_triangle`: four polygons of up to 12 corners."""
@@ -58,6 +59,9 @@ def integral_over_triangle(
     if not above and not both:
         return 0.0
     if not (above and below) and min(abs(z0), abs(z1), abs(z2)) > 0.0:
+        east, north = _slab(triangle, 0, half_x), _slab(triangle, 1, half_y)
+        if _SEVERAL not in (east, north):
+            return area * _uncut(triangle, east, north, half_x, half_y)
         return area * _half(triangle, 1.0 if above else -1.0, half_x, half_y, scratch)
     if contact(triangle, area, half_x, half_y, both) == SATURATED:
         return math.inf
@@ -67,6 +71,30 @@ def integral_over_triangle(
     if both and below:
         mean += _half(triangle, -1.0, half_x, half_y, scratch)
     return area * mean
+
+
+@kernel
+def _slab(triangle: Floats, axis: int, half: float) -> int:
+    """Return 1 or -1 when the triangle lies beyond the border at half or -half, 0 between them, else _SEVERAL."""
+    a, b, c = triangle[0, axis], triangle[1, axis], triangle[2, axis]
+    low, high = min(a, b, c), max(a, b, c)
+    if low >= half:
+        return 1
+    if high <= -half:
+        return -1
+    return 0 if -half <= low and high <= half else _SEVERAL
+
+
+@kernel
+def _uncut(triangle: Floats, east: int, north: int, half_x: float, half_y: float) -> float:
+    """Return the mean of 1/dist over a triangle on one side of z = 0 and within one region."""
+    if east == 0 and north == 0:
+        return mean_inverse_linear(abs(triangle[0, 2]), abs(triangle[1, 2]), abs(triangle[2, 2]))
+    return mean_over_triangle(
+        (abs(east) * (abs(triangle[0, 0]) - half_x), abs(north) * (abs(triangle[0, 1]) - half_y), abs(triangle[0, 2])),
+        (abs(east) * (abs(triangle[1, 0]) - half_x), abs(north) * (abs(triangle[1, 1]) - half_y), abs(triangle[1, 2])),
+        (abs(east) * (abs(triangle[2, 0]) - half_x), abs(north) * (abs(triangle[2, 1]) - half_y), abs(triangle[2, 2])),
+    )
 
 
 @kernel

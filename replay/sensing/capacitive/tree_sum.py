@@ -1,6 +1,6 @@
 """The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
 
-The tree is walked from the root. A node (or triangle) of area A whose own rigorous error bound E fits the budget is
+The tree is walked from the root. A node (or triangle) of area A whose own error bound E fits the budget is
 summed at once, else it is opened; a triangle that does not fit is integrated in closed form. The budget is one: every
 node that has been summed brought rtol x its own lower bound A/(r + h) and took E, and the rest is left for the nodes to
 come. So the sum of all E never exceeds rtol times a lower bound of the sum, and the result meets rtol.
@@ -15,10 +15,11 @@ h the largest distance of a corner from the centroid, d a point's place about it
   E = A spread4 h / (r^6 (1 - x)), spread4 the mean of |d|^4.
 - Part of it may lie over a border, by at most w: there 1/dist is expanded in the wrong region's form, whose squared
   distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3), mean(w^2) <= min(largest w^2, variance across the
-  border). Nothing is clipped: that error is far below what the border's curvature jump seems to cost.
-- A single triangle: 1 point, E = A spread2/(r - h)^3, borders or not (|Hessian of 1/dist| <= 2/dist^3); 3 points of
-  degree 2, E = 1.5 A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = 2 A h^4 spread2/(r^7 (1 - x)); the last two
-  plus the border's term.
+  border). No cluster is clipped for it.
+- A single triangle takes the first that fits of: 1 point, E = A spread2/(r - h)^3, borders or not, as the Hessian of
+  1/dist is at most 2/dist^3; 3 points of degree 2, E = c A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4
+  spread2/(r^7 (1 - x)); 16 points of degree 8, E = c A h^7 spread2/(r^10 (1 - x)); all but the first plus the border's
+  term; c as measured, see `triangle_rules`. Where the border's term is in the way, the triangle is cut.
 """
 
 from __future__ import annotations
@@ -31,9 +32,22 @@ from numpy.typing import NDArray
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import kernel
-from replay.sensing.capacitive.clusters import PAIRS, Clusters
+from replay.sensing.capacitive.clusters import (
+    AREA,
+    CENTROID,
+    FOURTH,
+    LOWER,
+    NORMAL,
+    OPENING,
+    RADIUS,
+    SECOND,
+    SPREAD4,
+    THIRD,
+    UPPER,
+    Clusters,
+)
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.triangle_rules import allowance, triangle_within
+from replay.sensing.capacitive.triangle_rules import PIECES, allowance, triangle_within
 from replay.sensing.capacitive.triangle_sum import into_plate
 
 Floats = NDArray[np.float64]
@@ -67,7 +81,8 @@ def sum_tree(
     n, plates = len(T_plate_body), len(half_sizes)
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
     bound = np.zeros((n, plates))
-    scratch, corners, stack = np.empty(SCRATCH), np.empty((3, 3)), np.empty(MAX_DEPTH + 1, np.int64)
+    scratch, pieces, corners = np.empty(SCRATCH), np.empty((PIECES, 4, 3)), np.empty((3, 3))
+    stack = np.empty(MAX_DEPTH + 1, np.int64)
     for frame in range(n):
         for plate in range(plates):
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _walk(
@@ -80,6 +95,7 @@ def sum_tree(
                 facing,
                 rtol,
                 scratch,
+                pieces,
                 corners,
                 stack,
             )
@@ -97,6 +113,7 @@ def _walk(
     facing: bool,
     rtol: float,
     scratch: Floats,
+    pieces: Floats,
     corners: Floats,
     stack: NDArray[np.int64],
 ) -> tuple[float, bool, float]:
@@ -109,11 +126,13 @@ def _walk(
     )
     stack[0] = 0
     size = 1
+    nodes, moments = clusters.nodes, clusters.moments
     while size > 0:
         size -= 1
-        node = stack[size]
-        x, y, z = _place(T, clusters.centroid[node, 0], clusters.centroid[node, 1], clusters.centroid[node, 2])
-        h, area = clusters.radius[node], clusters.area[node]
+        index = stack[size]
+        node = nodes[index]
+        x, y, z = _place(T, node[CENTROID], node[CENTROID + 1], node[CENTROID + 2])
+        h, area = node[RADIUS], node[AREA]
         if not both and z + h < 0.0:
             continue
         u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
@@ -122,33 +141,34 @@ def _walk(
         if r > 2.0 * h:
             share = rtol * area / (r + h)
             allowed = allowance(share, saved)
-            error = area * clusters.spread4[node] * h / (r * r * r * r * r * (r - h))
+            error = area * node[SPREAD4] * h / (r * r * r * r * r * (r - h))
             if error <= allowed:
                 verdict = 1
                 if not both and z - h <= 0.0:
-                    verdict = _side(clusters, tree, T, node, z)
+                    verdict = _side(node, T, z)
                 if facing and verdict == 1:
-                    verdict = _faces(clusters, node, centre)
+                    verdict = _faces(node, centre)
                 if verdict == -1:
                     continue
                 if verdict == 1:
-                    error += _border_error(clusters, tree, T, node, x, y, half_x, half_y, area, h, r)
+                    over_x = _border(node, moments[index], T, 0, x, half_x, h)
+                    over_y = _border(node, moments[index], T, 1, y, half_y, h)
+                    error += area * (over_x + over_y) / (2.0 * (r - h) ** 3)
                     if error <= allowed:
-                        value = area * _expansion(clusters, T, node, u, v, z, r)
-                        total, e = two_sum(total, value)
+                        total, e = two_sum(total, area * _expansion(moments[index], T, u, v, z, r))
                         lost += e
                         saved += share - error
                         spent += error
                         continue
-        if tree.second[node] >= 0:
-            stack[size] = tree.second[node]
-            stack[size + 1] = node + 1
+        if tree.second[index] >= 0:
+            stack[size] = tree.second[index]
+            stack[size + 1] = index + 1
             size += 2
             continue
-        for k in range(tree.begin[node], tree.end[node]):
+        for k in range(tree.begin[index], tree.end[index]):
             into_plate(T, clusters.triangles[k], corners)
             value, share, error, touches = triangle_within(
-                corners, clusters.areas[k], half_x, half_y, both, facing, rtol, saved, scratch
+                corners, clusters.areas[k], half_x, half_y, both, facing, rtol, saved, scratch, pieces
             )
             touching = touching or touches
             if value == math.inf:
@@ -170,41 +190,37 @@ def _place(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float
 
 
 @kernel
-def _reach(clusters: Clusters, tree: Tree, T: Floats, node: int, axis: int, sign: float) -> float:
+def _reach(node: Floats, T: Floats, axis: int, sign: float) -> float:
     """Return how far the node's box reaches from its centroid along a plate axis, sign +1 or -1."""
     reach = 0.0
     for k in range(3):
         e = sign * T[axis, k]
-        edge = tree.upper[node, k] if e > 0.0 else tree.lower[node, k]
-        reach += e * (edge - clusters.centroid[node, k])
-    return min(reach, clusters.radius[node])
+        reach += e * (node[UPPER + k] if e > 0.0 else node[LOWER + k])
+    return min(reach, node[RADIUS])
 
 
 @kernel
-def _side(clusters: Clusters, tree: Tree, T: Floats, node: int, z: float) -> int:
+def _side(node: Floats, T: Floats, z: float) -> int:
     """Return 1 when the node is in front of the plate's plane, -1 when it is behind, 0 when it may be both."""
-    if z - _reach(clusters, tree, T, node, 2, -1.0) > 0.0:
+    if z - _reach(node, T, 2, -1.0) > 0.0:
         return 1
-    return -1 if z + _reach(clusters, tree, T, node, 2, 1.0) < 0.0 else 0
+    return -1 if z + _reach(node, T, 2, 1.0) < 0.0 else 0
 
 
 @kernel
-def _faces(clusters: Clusters, node: int, centre: tuple[float, float, float]) -> int:
+def _faces(node: Floats, centre: tuple[float, float, float]) -> int:
     """Return 1 when all triangles of the node face the plate's centre, -1 when none does, 0 when it may be either.
 
     With v from the centroid to the centre, the angle between a normal and the way from a corner to the centre differs
-    from that between the cone's axis and v by at most the cone's half angle plus asin(h/|v|).
+    from that between the cone's axis and v by at most the cone's half angle plus asin(h/|v|), which must stay below 90
+    degrees: all face the centre when the cosine of the angle to v exceeds the sine of that sum.
     """
-    cx = centre[0] - clusters.centroid[node, 0]
-    cy = centre[1] - clusters.centroid[node, 1]
-    cz = centre[2] - clusters.centroid[node, 2]
+    cx, cy, cz = centre[0] - node[CENTROID], centre[1] - node[CENTROID + 1], centre[2] - node[CENTROID + 2]
     distance = math.sqrt(cx * cx + cy * cy + cz * cz)
-    h, opening = clusters.radius[node], clusters.opening[node]
+    h, opening = node[RADIUS], node[OPENING]
     if opening <= 0.0 or h >= distance:
         return 0
-    normal = clusters.normal[node]
-    cosine = (cx * normal[0] + cy * normal[1] + cz * normal[2]) / distance
-    # |cosine| > sin(half angle + asin(h/|v|)), both angles below 90 degrees and so must be their sum
+    cosine = (cx * node[NORMAL] + cy * node[NORMAL + 1] + cz * node[NORMAL + 2]) / distance
     sine_cone = math.sqrt(max(0.0, 1.0 - opening * opening))
     sine_ball = h / distance
     cosine_ball = math.sqrt(max(0.0, 1.0 - sine_ball * sine_ball))
@@ -217,64 +233,58 @@ def _faces(clusters: Clusters, node: int, centre: tuple[float, float, float]) ->
 
 
 @kernel
-def _border_error(
-    clusters: Clusters,
-    tree: Tree,
-    T: Floats,
-    node: int,
-    x: float,
-    y: float,
-    half_x: float,
-    half_y: float,
-    area: float,
-    h: float,
-    r: float,
-) -> float:
-    """Return the error bound [m] of expanding the whole node in the region of its centroid."""
+def _border(node: Floats, moments: Floats, T: Floats, axis: int, position: float, half: float, h: float) -> float:
+    """Return a bound of mean(w^2) [m^2], w the depth by which the node lies over the two borders across one axis."""
+    if abs(abs(position) - half) >= h and abs(abs(position) + half) >= h:
+        return 0.0
     over = 0.0
-    for axis in range(2):
-        position, half = (x, half_x) if axis == 0 else (y, half_y)
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            # towards the border at sign x half, from either side of it
-            gap = half - sign * position
-            beyond = _reach(clusters, tree, T, node, axis, sign if gap >= 0.0 else -sign) - abs(gap)
-            if beyond > 0.0:
-                over += min(beyond * beyond, _variance(clusters, T, node, axis))
-    return area * over / (2.0 * (r - h) ** 3)
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        # towards the border at sign x half, from whichever side of it the centroid is on
+        gap = half - sign * position
+        beyond = _reach(node, T, axis, sign if gap >= 0.0 else -sign) - abs(gap)
+        if beyond > 0.0:
+            a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
+            variance = a * a * moments[SECOND] + b * b * moments[SECOND + 1] + c * c * moments[SECOND + 2]
+            variance += 2.0 * (a * b * moments[SECOND + 3] + a * c * moments[SECOND + 4] + b * c * moments[SECOND + 5])
+            over += min(beyond * beyond, variance)
+    return over
 
 
 @kernel
-def _variance(clusters: Clusters, T: Floats, node: int, axis: int) -> float:
-    s = clusters.second[node]
-    a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
-    return a * a * s[0] + b * b * s[1] + c * c * s[2] + 2.0 * (a * b * s[3] + a * c * s[4] + b * c * s[5])  # type: ignore[no-any-return]
+def _expansion(moments: Floats, T: Floats, u: float, v: float, z: float, r: float) -> float:
+    """Return the mean of 1/dist over a node, from its moments up to the fourth.
 
-
-@kernel
-def _expansion(clusters: Clusters, T: Floats, node: int, u: float, v: float, z: float, r: float) -> float:
-    """Return the mean of 1/dist over a node, from its moments up to the fourth."""
+    With n the unit vector of r in the body's frame, t = (n.d)^2 and q = |Pd|^2 are quadratic forms of d. Orders 2, 3, 4
+    are the means of (3 t - q)/2, n.d (5 t - 3 q)/2 and (35 t^2 - 30 t q + 3 q^2)/8 = 35/8 (t - _T1 q)(t - _T2 q).
+    """
     inverse = 1.0 / r
-    # the direction of r in the body's frame; t = (n.d)^2, q = |Pd|^2 as quadratic forms of d, entries xy.. doubled
     n0 = (T[0, 0] * u + T[1, 0] * v + T[2, 0] * z) * inverse
     n1 = (T[0, 1] * u + T[1, 1] * v + T[2, 1] * z) * inverse
     n2 = (T[0, 2] * u + T[1, 2] * v + T[2, 2] * z) * inverse
     drop_x, drop_y = 1.0 if u == 0.0 else 0.0, 1.0 if v == 0.0 else 0.0
-    second, third, fourth = clusters.second[node], clusters.third[node], clusters.fourth[node]
+    x0, x1, x2, y0, y1, y2 = T[0, 0], T[0, 1], T[0, 2], T[1, 0], T[1, 1], T[1, 2]
+    # entries xy, xz, yz count twice
     t = (n0 * n0, n1 * n1, n2 * n2, 2.0 * n0 * n1, 2.0 * n0 * n2, 2.0 * n1 * n2)
+    q = (
+        1.0 - drop_x * x0 * x0 - drop_y * y0 * y0,
+        1.0 - drop_x * x1 * x1 - drop_y * y1 * y1,
+        1.0 - drop_x * x2 * x2 - drop_y * y2 * y2,
+        -2.0 * (drop_x * x0 * x1 + drop_y * y0 * y1),
+        -2.0 * (drop_x * x0 * x2 + drop_y * y0 * y2),
+        -2.0 * (drop_x * x1 * x2 + drop_y * y1 * y2),
+    )
     order2, order3, order4 = 0.0, 0.0, 0.0
+    place = FOURTH
     for i in range(6):
-        a, b = PAIRS[i, 0], PAIRS[i, 1]
-        q_i = (1.0 if i < 3 else 0.0) - drop_x * T[0, a] * T[0, b] - drop_y * T[1, a] * T[1, b]
-        q_i = q_i if i < 3 else 2.0 * q_i
-        order2 += (1.5 * t[i] - 0.5 * q_i) * second[i]
-        along = n0 * third[0, i] + n1 * third[1, i] + n2 * third[2, i]
-        order3 += (2.5 * t[i] - 1.5 * q_i) * along
-        row = 0.0
-        for j in range(6):
-            c, d = PAIRS[j, 0], PAIRS[j, 1]
-            q_j = (1.0 if j < 3 else 0.0) - drop_x * T[0, c] * T[0, d] - drop_y * T[1, c] * T[1, d]
-            row += (t[j] - _T2 * (q_j if j < 3 else 2.0 * q_j)) * fourth[i, j]
-        order4 += (t[i] - _T1 * q_i) * row
+        order2 += (1.5 * t[i] - 0.5 * q[i]) * moments[SECOND + i]
+        along = n0 * moments[THIRD + i] + n1 * moments[THIRD + 6 + i] + n2 * moments[THIRD + 12 + i]
+        order3 += (2.5 * t[i] - 1.5 * q[i]) * along
+        first, second = t[i] - _T1 * q[i], t[i] - _T2 * q[i]
+        order4 += first * second * moments[place]
+        place += 1
+        for j in range(i + 1, 6):
+            order4 += (first * (t[j] - _T2 * q[j]) + second * (t[j] - _T1 * q[j])) * moments[place]
+            place += 1
     order4 *= 35.0 / 8.0
     return inverse * (1.0 + inverse * inverse * (order2 - inverse * (order3 - inverse * order4)))
