@@ -15,19 +15,21 @@ class Check:
     """What the answers of one contender are worth against the reference.
 
     Attributes:
-        worst_error: largest error over all queries, in the unit that the case states; NaN if none could be compared.
+        worst_error: largest error over all queries, in the unit that the case states; NaN if any is no number.
         wrong: queries whose answer is wrong beyond the tolerance the case states.
         tolerance: the error up to which an answer counts as right; inf where only a curve of error is wanted.
+        mean_error: where the case asks for it.
     """
 
     worst_error: float
     wrong: int = 0
     tolerance: float = math.inf
+    mean_error: float = math.nan
 
     @property
     def failed(self) -> bool:
-        """Whether this contender must not be called fast: it answered wrongly."""
-        return self.wrong > 0
+        """Whether this contender must not be called fast: it answered wrongly, or with an error that is no number."""
+        return self.wrong > 0 or math.isnan(self.worst_error)
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,7 @@ class Row:
     wrong: int
     queries: int
     failed: bool
+    mean_error: float = math.nan
     note: str = ""
 
     @property
@@ -98,9 +101,20 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
             wrong=check.wrong,
             queries=contender.queries,
             failed=check.failed,
+            mean_error=check.mean_error,
         )
         for contender, taken, check in zip(contenders, times, checks, strict=True)
     ]
+
+
+def exponent(points: Sequence[tuple[float, float]]) -> float:
+    """Return p of the law y ~ x^p fitted to points (x, y) by least squares in the logarithms; NaN below two points."""
+    if len(points) < 2:
+        return math.nan
+    x, y = [math.log(point[0]) for point in points], [math.log(point[1]) for point in points]
+    mean_x, mean_y = statistics.fmean(x), statistics.fmean(y)
+    square = sum((a - mean_x) ** 2 for a in x)
+    return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)) / square
 
 
 def absent(case: str, method: str, why: str) -> Row:

@@ -35,13 +35,36 @@ PACKAGES = (
 
 @dataclass(frozen=True)
 class Plot:
-    """A log-log plot: one line (or cloud) of (x, y) per name."""
+    """A log-log plot: one line (or cloud) of (x, y) per name.
+
+    Attributes:
+        title, x_label, y_label: texts.
+        lines: points by name; an error of 0 is drawn at `LEAST_ERROR`.
+        joined: whether the points of a name are joined by a line.
+        front: whether the Pareto front is drawn: the points that no other beats in x and in y.
+    """
 
     title: str
     x_label: str
     y_label: str
     lines: dict[str, list[tuple[float, float]]]
     joined: bool = False
+    front: bool = False
+
+
+LEAST_ERROR = 1e-17
+"""Where plots draw an error of 0, and what is smaller."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table of another shape than timed rows: one dictionary a line, all with the same keys."""
+
+    lines: list[dict[str, Any]]
+
+    def cells(self) -> list[list[str]]:
+        """Return headings and lines as texts."""
+        return [list(self.lines[0]), *([str(value) for value in line.values()] for line in self.lines)]
 
 
 @dataclass
@@ -50,6 +73,7 @@ class Report:
 
     name: str
     tables: dict[str, list[Row]] = field(default_factory=dict)
+    grids: dict[str, Grid] = field(default_factory=dict)
     goals: list[Goal] = field(default_factory=list)
     plots: list[Plot] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -60,6 +84,7 @@ class Report:
             "benchmark": self.name,
             "machine": machine(),
             "tables": {title: [_finite(asdict(row)) for row in rows] for title, rows in self.tables.items()},
+            "grids": {title: grid.lines for title, grid in self.grids.items()},
             "goals": [_finite({**asdict(goal), "verdict": goal.verdict}) for goal in self.goals],
             "notes": self.notes,
         }
@@ -69,6 +94,8 @@ class Report:
         parts = []
         for title, rows in self.tables.items():
             parts.append(f"{title}\n" + _align([_HEADINGS, *(_cells(row) for row in rows)]))
+        for title, grid in self.grids.items():
+            parts.append(f"{title}\n" + _align(grid.cells()))
         if self.goals:
             cells = [("goal", "target", "measured", "verdict"), *(_goal_cells(goal) for goal in self.goals)]
             parts.append("goals\n" + _align(cells))
@@ -93,6 +120,9 @@ class Report:
         tables = "".join(
             f"<h2>{html.escape(title)}</h2>{_html_table([_HEADINGS, *(_cells(row) for row in rows)])}"
             for title, rows in self.tables.items()
+        )
+        tables += "".join(
+            f"<h2>{html.escape(title)}</h2>{_html_table(grid.cells())}" for title, grid in self.grids.items()
         )
         pictures = "".join(
             f'<figure><img alt="{html.escape(plot.title)}" src="data:image/png;base64,{_png(plot)}"></figure>'
@@ -135,15 +165,41 @@ def _processor() -> str:
     return names[0] if names else platform.machine()
 
 
-_HEADINGS = ("case", "method", "us/query", "fastest", "slowest", "worst error", "wrong", "note")
+def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None) -> Plot:
+    """Return error over time per query for the rows that did not fail, the Pareto front marked.
+
+    Args:
+        title, error: texts; `error` says what the error is measured in.
+        rows: of one case.
+        groups: name of the line a method belongs to; its own name where it is not listed.
+    """
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        if row.rounds and not row.failed:
+            name = (groups or {}).get(row.method, row.method)
+            lines.setdefault(name, []).append((row.median, row.worst_error))
+    return Plot(title, "s per query", error, lines, joined=True, front=True)
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the points that no other point beats in both coordinates, by growing x."""
+    front: list[tuple[float, float]] = []
+    for point in sorted(points):
+        if not front or point[1] < front[-1][1]:
+            front.append(point)
+    return front
+
+
+_HEADINGS = ("case", "method", "us/query", "fastest", "slowest", "worst error", "mean error", "wrong", "note")
 
 
 def _cells(row: Row) -> tuple[str, ...]:
     if row.rounds == 0:
-        return (row.case, row.method, "", "", "", "", "", row.note)
+        return (row.case, row.method, "", "", "", "", "", "", row.note)
     note = "FAILED: wrong answers" if row.failed else row.note
     times = (f"{1e6 * value:.4g}" for value in (row.median, row.low, row.high))
-    return (row.case, row.method, *times, f"{row.worst_error:.2g}", f"{row.wrong}/{row.queries}", note)
+    mean = "" if math.isnan(row.mean_error) else f"{row.mean_error:.2g}"
+    return (row.case, row.method, *times, f"{row.worst_error:.2g}", mean, f"{row.wrong}/{row.queries}", note)
 
 
 def _goal_cells(goal: Goal) -> tuple[str, ...]:
@@ -173,11 +229,20 @@ def _png(plot: Plot) -> str:
 
     figure = Figure(figsize=(7.5, 5.0), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
-    for name, points in plot.lines.items():
-        x, y = [point[0] for point in points], [point[1] for point in points]
-        axes.plot(x, y, "o-" if plot.joined else "o", label=name, markersize=5)
+    drawn = {
+        name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points)
+        for name, points in plot.lines.items()
+    }
+    for name, line in drawn.items():
+        axes.plot(*zip(*line, strict=True), "o-" if plot.joined else "o", label=name, markersize=5)
+    if plot.front and drawn:
+        front = pareto_front([point for line in drawn.values() for point in line])
+        x, y = zip(*front, strict=True)
+        axes.step(x, y, "k--", where="post", linewidth=1, label="Pareto front")
+        axes.plot(x, y, "ko", markersize=11, fillstyle="none")
     axes.grid(visible=True, which="major", alpha=0.3)
-    axes.legend(fontsize=8)
+    if drawn:
+        axes.legend(fontsize=8)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     return base64.b64encode(buffer.getvalue()).decode("ascii")
