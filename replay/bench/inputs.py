@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from replay.errors import MissingPackageError
 from replay.geometry.mesh import load_mesh
+from replay.geometry.primitives import cuboid
 from replay.numerics import transforms
 
 Floats = NDArray[np.float64]
@@ -23,6 +24,11 @@ PHANTOM_FILES = {1_000: "adult_male_reduced_1000t.stl", 26_756: "adult_male.stl"
 def box(size: tuple[float, float, float]) -> Floats:
     """Return the corners (8, 3) [m] of a box with full edges `size`, about its centre."""
     return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * np.array(size)
+
+
+def box_surface(size: tuple[float, float, float]) -> Floats:
+    """Return the 12 triangles (12, 3, 3) [m] of a box about its centre."""
+    return cuboid(size).triangles
 
 
 def spiral(count: int) -> Floats:

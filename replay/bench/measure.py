@@ -19,12 +19,14 @@ class Check:
         wrong: queries whose answer is wrong beyond the tolerance the case states.
         tolerance: the error up to which an answer counts as right; inf where only a curve of error is wanted.
         mean_error: where the case asks for it.
+        missed: queries in which an inexact method says "nothing there" while there is something.
     """
 
     worst_error: float
     wrong: int = 0
     tolerance: float = math.inf
     mean_error: float = math.nan
+    missed: int = 0
 
     @property
     def failed(self) -> bool:
@@ -64,6 +66,7 @@ class Row:
     queries: int
     failed: bool
     mean_error: float = math.nan
+    missed: int = 0
     note: str = ""
 
     @property
@@ -102,6 +105,7 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
             queries=contender.queries,
             failed=check.failed,
             mean_error=check.mean_error,
+            missed=check.missed,
         )
         for contender, taken, check in zip(contenders, times, checks, strict=True)
     ]

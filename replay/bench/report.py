@@ -42,6 +42,7 @@ class Plot:
         lines: points by name; an error of 0 is drawn at `LEAST_ERROR`.
         joined: whether the points of a name are joined by a line.
         front: whether the Pareto front is drawn: the points that no other beats in x and in y.
+        crossed: points of methods that missed something, drawn with a cross; they are not on the front.
     """
 
     title: str
@@ -50,6 +51,7 @@ class Plot:
     lines: dict[str, list[tuple[float, float]]]
     joined: bool = False
     front: bool = False
+    crossed: list[tuple[float, float]] = field(default_factory=list)
 
 
 LEAST_ERROR = 1e-17
@@ -174,11 +176,14 @@ def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, s
         groups: name of the line a method belongs to; its own name where it is not listed.
     """
     lines: dict[str, list[tuple[float, float]]] = {}
+    crossed = []
     for row in rows:
         if row.rounds and not row.failed:
             name = (groups or {}).get(row.method, row.method)
             lines.setdefault(name, []).append((row.median, row.worst_error))
-    return Plot(title, "s per query", error, lines, joined=True, front=True)
+            if row.missed:
+                crossed.append((row.median, row.worst_error))
+    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -196,7 +201,8 @@ _HEADINGS = ("case", "method", "us/query", "fastest", "slowest", "worst error", 
 def _cells(row: Row) -> tuple[str, ...]:
     if row.rounds == 0:
         return (row.case, row.method, "", "", "", "", "", "", row.note)
-    note = "FAILED: wrong answers" if row.failed else row.note
+    missed = f"{row.missed} missed" if row.missed else ""
+    note = "FAILED: wrong answers" if row.failed else row.note or missed
     times = (f"{1e6 * value:.4g}" for value in (row.median, row.low, row.high))
     mean = "" if math.isnan(row.mean_error) else f"{row.mean_error:.2g}"
     return (row.case, row.method, *times, f"{row.worst_error:.2g}", mean, f"{row.wrong}/{row.queries}", note)
@@ -236,10 +242,13 @@ def _png(plot: Plot) -> str:
     for name, line in drawn.items():
         axes.plot(*zip(*line, strict=True), "o-" if plot.joined else "o", label=name, markersize=5)
     if plot.front and drawn:
-        front = pareto_front([point for line in drawn.values() for point in line])
-        x, y = zip(*front, strict=True)
-        axes.step(x, y, "k--", where="post", linewidth=1, label="Pareto front")
-        axes.plot(x, y, "ko", markersize=11, fillstyle="none")
+        crossed = {(x, max(y, LEAST_ERROR)) for x, y in plot.crossed}
+        front = pareto_front([point for line in drawn.values() for point in line if point not in crossed])
+        if front:
+            axes.step(*zip(*front, strict=True), "k--", where="post", linewidth=1, label="Pareto front")
+            axes.plot(*zip(*front, strict=True), "ko", markersize=11, fillstyle="none")
+        if crossed:
+            axes.plot(*zip(*crossed, strict=True), "kx", markersize=10, label="misses something")
     axes.grid(visible=True, which="major", alpha=0.3)
     if drawn:
         axes.legend(fontsize=8)
