@@ -7,9 +7,12 @@ numba, rerun, trimesh and scipy load only when something needs them.
 from __future__ import annotations
 
 import importlib
+import importlib.util
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from replay.comparison.runs import diff as diff
     from replay.recording.reader import read as read
     from replay.recording.record import record as record
     from replay.scenario.load import load as load
@@ -25,10 +28,34 @@ _PUBLIC = {
     "record": "replay.recording.record",
     "read": "replay.recording.reader",
     "Recording": "replay.recording.reader",
+    "diff": "replay.comparison.runs",
+    "Difference": "replay.comparison.difference",
 }
-_ROOMS = ("errors", "numerics", "geometry", "kinematics", "collision", "sensing", "scenario", "recording", "simulation")
+_ROOMS = (
+    "errors",
+    "numerics",
+    "geometry",
+    "kinematics",
+    "collision",
+    "sensing",
+    "scenario",
+    "recording",
+    "simulation",
+    "comparison",
+)
 
 __all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
+
+
+def submodules(package: str) -> Callable[[str], Any]:
+    """Return a package's `__getattr__` that imports its modules on first use: `replay.collision.gjk` just works."""
+
+    def resolve(name: str) -> Any:
+        if not name.startswith("_") and importlib.util.find_spec(f"{package}.{name}"):
+            return importlib.import_module(f"{package}.{name}")
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return resolve
 
 
 def __getattr__(name: str) -> Any:

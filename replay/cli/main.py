@@ -18,6 +18,7 @@ COMMANDS = {
     "validate": "check scenarios without running them",
     "info": "say what is in a recording",
     "export": "write a recording's topics as csv, json or parquet",
+    "diff": "say what differs between two recordings or two run folders",
     "view": "show recordings in the rerun viewer, or make a picture",
 }
 """Help by name of command; each is the function of that name in the module of that name."""

@@ -34,7 +34,7 @@ class Topic:
     name: str
     schema: str
     time: NDArray[np.int64]
-    columns: Mapping[str, NDArray[Any]]
+    columns: dict[str, NDArray[Any]]
     texts: Mapping[str, str | bytes]
     messages: tuple[Message, ...] | None
 
@@ -91,6 +91,7 @@ class _Reader:
             raise RecordingError(self._file, f"topic {self.name!r} is not protobuf with a schema")
         self._schema = schema
         self._type = message_type(self._file, schema.name, schema.data)
+        self._expected = log.count_of(channel)
         self.restart()
         self._decoding = False
 
@@ -98,7 +99,8 @@ class _Reader:
         """Forget what was read, and decode message by message from now on."""
         self._times: list[NDArray[np.int64]] = []
         self._shape: MessageShape | None = None
-        self._columns: dict[str, list[NDArray[Any]]] = {}
+        self._columns: dict[str, NDArray[Any]] = {}
+        self._count = 0
         self._messages: list[Message] = []
         self._decoding = True
 
@@ -114,13 +116,12 @@ class _Reader:
     def topic(self) -> Topic:
         """Return what was read; RecordingError when the statistics count another number of messages."""
         count = sum(len(time) for time in self._times)
-        expected = self._log.message_counts
-        if expected is not None and self._log.loss is None and expected.get(self._channel.id, 0) != count:
+        if self._expected is not None and self._expected != count:
             raise RecordingError(
                 self._file, f"damaged: topic {self.name!r} holds {count} messages, not as many as counted"
             )
         time = np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
-        columns = {path: np.concatenate(parts) for path, parts in self._columns.items()}
+        columns = {path: column[: self._count] for path, column in self._columns.items()}
         texts = self._shape.texts if self._shape else {}
         messages = tuple(self._messages) if self._decoding else None
         return Topic(self.name, self._schema.name, time, columns, texts, messages)
@@ -132,9 +133,23 @@ class _Reader:
             self._shape = shape_of(self._type.DESCRIPTOR, run.rows[0].tobytes())
         if self._shape is None or not self._shape.fits(run.rows):
             return False
+        begin, end = self._count, self._count + len(run.rows)
         for path, slot in self._shape.slots.items():
-            self._columns.setdefault(path, []).append(np.ascontiguousarray(slot.read(run.rows)))
+            values = slot.read(run.rows)
+            self._room(path, values, end)[begin:end] = values
+        self._count = end
         return True
+
+    def _room(self, path: str, values: NDArray[Any], end: int) -> NDArray[Any]:
+        """Return a column that has room for `end` rows: all that the statistics promise at once, else ever doubled."""
+        column = self._columns.get(path)
+        if column is None or len(column) < end:
+            rows = max(end, self._expected or 2 * end)
+            grown = np.empty((rows, *values.shape[1:]), dtype=values.dtype)
+            if column is not None:
+                grown[: len(column)] = column
+            self._columns[path] = column = grown
+        return column
 
     def _decode(self, data: bytes) -> Message:
         try:

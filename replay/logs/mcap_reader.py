@@ -19,6 +19,8 @@ from replay.errors import RecordingError
 from replay.logs.mcap_chunks import Run, read_message, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
+    MAX_RECORD,
+    MESSAGE_HEAD,
     PREAMBLE,
     RECORD_HEAD,
     Attachment,
@@ -32,9 +34,6 @@ from replay.logs.mcap_records import (
     read_chunk,
     read_schema,
 )
-
-MAX_RECORD = 1 << 30
-"""Largest record [bytes] that is read; a larger length is damage or an attack."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +100,24 @@ class McapLog:
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
         return self._bytes_at(attachment.begin, attachment.size)
+
+    def schema_name(self, channel: Channel) -> str:
+        """Return the name of a channel's message type, "" when it has none."""
+        schema = self.schemas.get(channel.schema_id)
+        return schema.name if schema else ""
+
+    def count_of(self, channel: int) -> int | None:
+        """Return how many messages a channel has by the statistics; None without them or in a salvaged file.
+
+        Raises:
+            RecordingError: more than the chunks can hold.
+        """
+        if self.message_counts is None or self.loss is not None:
+            return None
+        count = self.message_counts.get(channel, 0)
+        if count > sum(chunk.uncompressed_size for chunk in self.chunks) // (RECORD_HEAD + MESSAGE_HEAD):
+            raise self._damage(f"its statistics claim {count} messages of one topic, more than it holds")
+        return count
 
     def runs(self, chunk: Chunk) -> Iterator[Run]:
         """Yield the messages of a chunk, unpacked and verified."""

@@ -19,7 +19,7 @@ from replay.recording.blueprint import TIMELINE
 
 _STARTUP = 60.0  # [s] until the viewer must answer
 _LOADING = 60.0  # [s] until the picture must have come to rest
-_TOASTS = 7.0  # [s] the viewer's own notices stand over the picture when it starts
+_TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
 
 
@@ -82,7 +82,10 @@ def picture(
 
 @contextlib.contextmanager
 def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
-    """Run a viewer of its own, which nobody else can reach, and yield the client that steers it."""
+    """Run a viewer of its own, which nobody else can reach, and yield the client that steers it.
+
+    It finds an empty home: nobody's settings change the picture, and in its first session it sends no usage data.
+    """
     from rerun.experimental import ViewerClient
 
     with socket.socket() as probe:
@@ -90,8 +93,9 @@ def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
         port = probe.getsockname()[1]
     command = [str(viewer_binary()), str(recording), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
     command += ["--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen"]
-    environment = {**os.environ, "RERUN_ANALYTICS": "0"}
-    with tempfile.TemporaryFile("w+") as log:
+    with tempfile.TemporaryFile("w+") as log, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home:
+        places = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "APPDATA", "LOCALAPPDATA")
+        environment = {**os.environ, **dict.fromkeys(places, home)}
         process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
         try:
             yield _connect(ViewerClient, f"rerun+http://127.0.0.1:{port}/proxy", process, log)

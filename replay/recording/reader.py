@@ -181,9 +181,9 @@ class _Assembly:
         return self._topics[name]
 
     def _column(self, topic: Topic, path: str, count: int | None = None) -> NDArray[Any]:
-        """Return a field of all frames, (F,) or, with `count`, (F, count)."""
+        """Take a field of all frames out of a topic, (F,) or, with `count`, (F, count); so memory holds it once."""
         frames = len(self._frames)
-        column = topic.columns.get(path)
+        column = topic.columns.pop(path, None)
         if column is None and (count == 0 or not len(topic.time)) and topic.messages is None:
             column = np.zeros((len(topic.time), *(() if count is None else (count,))))
         if column is None or column.shape[1:] != (() if count is None else (count,)):

@@ -78,7 +78,7 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
             for run in log.runs(chunk):
                 counts[run.channel] += len(run.time)
         topics = [
-            TopicSummary(channel.topic, log.schemas[channel.schema_id].name, counts[channel.id])
+            TopicSummary(channel.topic, log.schema_name(channel), counts[channel.id])
             for channel in log.channels.values()
         ]
     return Summary(

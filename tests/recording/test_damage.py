@@ -13,6 +13,7 @@ import pytest
 
 from replay.errors import RecordingError
 from replay.recording.reader import read
+from replay.recording.summary import summarize
 from tests.recording import synthetic
 from tests.recording.test_round_trip import assert_same, write
 
@@ -136,3 +137,22 @@ def test_a_killed_writer_leaves_the_truth(tmp_path: Path) -> None:
 @pytest.mark.soak
 def test_many_killed_writers(tmp_path: Path) -> None:
     kill_at_random(tmp_path, 50, 5)
+
+
+def test_a_summary_tells_what_is_there_and_what_is_lost(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "made_up.mcap"
+    path.write_bytes(whole)
+    summary = summarize(path)
+    assert {topic.topic: topic.messages for topic in summary.topics}["/tf"] == FRAMES
+    assert summary.provenance == synthetic.described(FRAMES)
+    assert summary.files == {name: len(data) for name, data in synthetic.FILES.items()}
+    assert summary.loss is None and summary.lost_frames == 0 and summary.bytes == len(whole)
+    path.write_bytes(whole[: len(whole) * 3 // 4])
+    with pytest.raises(RecordingError, match="is cut"):
+        summarize(path)
+    salvaged = summarize(path, salvage=True)
+    assert salvaged.loss is not None and salvaged.lost_frames == FRAMES - 256 == read(path, salvage=True).lost_frames
+    path.write_bytes(whole[:3000])
+    for attempt in (read, summarize):
+        with pytest.raises(RecordingError):
+            attempt(path, salvage=True)

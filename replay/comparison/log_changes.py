@@ -1,0 +1,128 @@
+"""What two files say apart from their columns: scene, schemas, and whether their messages are the same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from google.protobuf.descriptor import FieldDescriptor
+
+from replay.comparison.difference import Change
+from replay.logs.mcap_reader import McapLog
+from replay.logs.mcap_records import Chunk
+from replay.logs.protobuf import message_type
+from replay.recording import messages
+
+SCENE = "/scene"
+"""The topic of the scene; begins the name of a body in changes and rules: `/scene/arc/bow`."""
+SCHEMAS = "/schemas"
+"""Begins the name of a field in changes and rules: `/schemas/collision/clearance`."""
+
+_MAX_DEPTH = 32
+
+
+def same_messages(a: McapLog, b: McapLog) -> bool:
+    """Return whether all messages of two files are the same, because their chunks are the same bytes.
+
+    Metadata and attachments may differ. False does not mean that any message differs.
+    """
+    if a.channels != b.channels or a.schemas != b.schemas or len(a.chunks) != len(b.chunks):
+        return False
+    with a.path.open("rb") as file_a, b.path.open("rb") as file_b:
+        return all(
+            (x.compression, x.compressed_size) == (y.compression, y.compressed_size)
+            and _packed(file_a, x) == _packed(file_b, y)
+            for x, y in zip(a.chunks, b.chunks, strict=True)
+        )
+
+
+def _packed(file: BinaryIO, chunk: Chunk) -> bytes:
+    file.seek(chunk.begin)
+    return file.read(chunk.compressed_size)
+
+
+def scene_changes(a: McapLog, b: McapLog) -> tuple[Change, ...]:
+    """Return the bodies of the scene that differ, by name: their shape, their colour, or the link that they are on."""
+    bodies_a, bodies_b = _bodies(a), _bodies(b)
+    return tuple(_changes(SCENE, bodies_a, bodies_b))
+
+
+def schema_changes(a: McapLog, b: McapLog) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
+    """Return the fields of topics that are lost or have another type, and those that are new.
+
+    A new field takes nothing from those who read the others, so it is told and does not decide.
+    """
+    fields_a, fields_b = _fields(a), _fields(b)
+    topics = {name.split(" ")[0] for name in fields_a} & {name.split(" ")[0] for name in fields_b}
+    changes = [
+        change
+        for change in _changes(SCHEMAS, fields_a, fields_b)
+        if change.name.removeprefix(SCHEMAS).split(" ")[0] in topics
+    ]
+    named = [Change(change.name.replace(" ", "/"), change.baseline, change.candidate) for change in changes]
+    return (
+        tuple(change for change in named if change.baseline is not None),
+        tuple(change for change in named if change.baseline is None),
+    )
+
+
+def _changes(prefix: str, a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[Change]:
+    for name in sorted({*a, *b}):
+        if a.get(name) != b.get(name):
+            yield Change(f"{prefix}{name}", a.get(name), b.get(name))
+
+
+def read_scene(path: Path) -> Any:
+    """Return the foxglove.SceneUpdate of a recording file, or None when there is no such file or no scene in it."""
+    if not path.is_file():
+        return None
+    with McapLog(path) as log:
+        return _scene(log)
+
+
+def _scene(log: McapLog) -> Any:
+    channels = [channel.id for channel in log.channels.values() if channel.topic == SCENE]
+    for chunk in log.chunks if channels else ():
+        for run in log.runs(chunk):
+            if run.channel in channels:
+                return messages.message_class(messages.SCENE).FromString(run.messages()[-1])
+    return None
+
+
+def _bodies(log: McapLog) -> dict[str, str]:
+    scene = _scene(log)
+    return {} if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
+
+
+def _described(entity: Any) -> str:
+    triangles = sum(len(mesh.indices) // 3 for mesh in entity.triangles)
+    digest = hashlib.sha256(entity.SerializeToString(deterministic=True)).hexdigest()
+    return f"{triangles} triangles on link {entity.frame_id}, sha256 {digest[:16]}"
+
+
+def _fields(log: McapLog) -> dict[str, str]:
+    """Return the type of each field by "topic path"."""
+    found: dict[str, str] = {}
+    for channel in log.channels.values():
+        schema = log.schemas[channel.schema_id]
+        descriptor = message_type(str(log.path), schema.name, schema.data).DESCRIPTOR
+        found[f"{channel.topic} schema"] = schema.name
+        found |= {f"{channel.topic} {path}": kind for path, kind in _flat(descriptor, "", 0)}
+    return found
+
+
+def _flat(descriptor: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
+    for field in descriptor.fields:
+        path = f"{prefix}{field.name}"
+        yield path, f"field {field.number}, {_KINDS[field.type]}{' array' if field.is_repeated else ''}"
+        if field.message_type is not None and depth < _MAX_DEPTH:
+            yield from _flat(field.message_type, f"{path}.", depth + 1)
+
+
+_KINDS = {
+    value: name.removeprefix("TYPE_").lower()
+    for name, value in vars(FieldDescriptor).items()
+    if name.startswith("TYPE_") and isinstance(value, int)
+}

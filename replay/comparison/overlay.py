@@ -1,0 +1,227 @@
+"""Two runs in one rerun recording: both scenes in two colours, their readings and differences over time, what differs.
+
+For people's eyes: the scene once as baseline (blue) and once as candidate (orange), curves of both for the signals
+that differ, the differences in charts of their own, and a log of moments: selecting a line jumps to it, and the first
+line is the first difference. The time selection spans what differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.comparison import wording
+from replay.comparison.difference import Event, Moment, SignalDifference
+from replay.comparison.log_changes import read_scene
+from replay.comparison.plots import Curve, Curves
+from replay.comparison.report_text import text
+from replay.comparison.runs import Case, Pair, RunDifference
+from replay.logs.part_file import PartFile
+from replay.recording.blueprint import TIMELINE
+from replay.recording.reader import Recording
+from replay.recording.rerun_log import APPLICATION
+
+Color = tuple[int, int, int, int]
+
+BASELINE, CANDIDATE, DIFFERENCE = "baseline", "candidate", "difference"
+"""First parts of the entities: `/baseline/scene/arm/beam`, `/candidate/values/FIELD/SIGNAL`, `/difference/...`."""
+COLORS: dict[str, Color] = {BASELINE: (70, 150, 240, 110), CANDIDATE: (250, 140, 40, 110)}
+CURVES = 24
+"""Signals that are drawn; those that decide come first."""
+
+_OPAQUE = 255
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """A moment worth a look."""
+
+    at: Moment
+    level: str
+    text: str
+
+
+def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool = True) -> None:
+    """Write the recording that shows both runs of a scenario.
+
+    Args:
+        path: the `.rrd` file.
+        case: what differs.
+        pair: the two recordings.
+        overwrite: replace a file that exists.
+
+    Raises:
+        RecordingExistsError: the file exists and may not be replaced.
+        WriteError: it cannot be written.
+    """
+    import rerun as rr
+
+    file = PartFile(Path(path), overwrite=overwrite)
+    stream = rr.RecordingStream(APPLICATION)
+    try:
+        marks = sorted(_marks(case), key=lambda mark: mark.at.time)
+        shown = case.difference.signals[:CURVES]
+        stream.save(file.part, default_blueprint=_blueprint(marks, list(dict.fromkeys(map(_chart, shown)))))
+        stream.send_recording_name(f"{case.name}: baseline and candidate")
+        summary = text(RunDifference(str(case.baseline), str(case.candidate), (case,)), verbose=True)
+        stream.log("summary", rr.TextDocument(summary), static=True)
+        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for side, recording in ((BASELINE, pair.baseline), (CANDIDATE, pair.candidate)):
+            _log_scene(stream, side, recording)
+            _log_poses(stream, side, recording)
+        curves = Curves(pair)
+        for item in shown:
+            _log_curve(stream, item, curves.curve(item), pair.baseline)
+        _log_marks(stream, marks)
+        stream.flush()
+        stream.disconnect()
+        file.commit()
+    except BaseException:
+        stream.disconnect()
+        file.discard()
+        raise
+
+
+def _log_scene(stream: Any, side: str, recording: Recording) -> None:
+    import rerun as rr
+
+    scene = read_scene(recording.path)
+    for entity in scene.entities if scene is not None else ():
+        for mesh in entity.triangles:
+            positions = np.array([(point.x, point.y, point.z) for point in mesh.points]).reshape(-1, 3)
+            triangles = np.array(mesh.indices, dtype=np.uint32).reshape(-1, 3)
+            body = [side, "scene", entity.frame_id, entity.id.rpartition("/")[2]]
+            shape = rr.Mesh3D(vertex_positions=positions, triangle_indices=triangles, albedo_factor=COLORS[side])
+            stream.log(body, shape, static=True)
+
+
+def _log_poses(stream: Any, side: str, recording: Recording) -> None:
+    import rerun as rr
+
+    for link, name in enumerate(recording.layout.links):
+        poses = recording.link_poses[:, link]
+        rows = np.ones(len(poses), dtype=np.bool_)
+        rows[1:] = (poses[1:] != poses[:-1]).any(axis=(1, 2))
+        columns = rr.Transform3D.columns(
+            translation=poses[rows][:, :3, 3], quaternion=recording.link_quaternions[rows, link]
+        )
+        _send(stream, [side, "scene", name], recording.time[rows], np.flatnonzero(rows), columns)
+
+
+def _log_curve(stream: Any, item: SignalDifference, curve: Curve, baseline: Recording) -> None:
+    import rerun as rr
+
+    time = np.round(curve.seconds * 1e9).astype(np.int64)
+    frames = np.searchsorted(baseline.time, time)
+    name = item.signal.full_name
+    unit = f" [{item.signal.unit}]" if item.signal.unit else ""
+    values = ((BASELINE, curve.baseline), (CANDIDATE, curve.candidate), (DIFFERENCE, curve.error))
+    for side, column in values:
+        if side != DIFFERENCE and item.signal.field == "rotation":
+            continue
+        chart = _chart(item)
+        path = [side, "values", chart, name] if side != DIFFERENCE else [side, chart, name]
+        color = (*COLORS[side][:3], _OPAQUE) if side in COLORS else None
+        title = f"{side}: {name}{unit}" if side != DIFFERENCE else f"{name}{unit}"
+        lines = rr.SeriesLines(names=title, colors=color, widths=3.0 if side == BASELINE else 1.5)
+        stream.log(path, lines, static=True)
+        _send(stream, path, time, frames, rr.Scalars.columns(scalars=column))
+
+
+def _log_marks(stream: Any, marks: list[_Mark]) -> None:
+    import rerun as rr
+
+    if not marks:
+        return
+    time = np.array([round(mark.at.time * 1e9) for mark in marks], dtype=np.int64)
+    texts = [mark.text for mark in marks]
+    texts[0] = f"first difference: {texts[0]}"
+    columns = rr.TextLog.columns(text=texts, level=[mark.level for mark in marks])
+    _send(stream, [DIFFERENCE, "moments"], time, np.array([mark.at.frame for mark in marks]), columns)
+
+
+def _send(stream: Any, path: list[str], time: NDArray[np.int64], frames: NDArray[Any], *columns: Any) -> None:
+    import rerun as rr
+
+    index = [
+        rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]")),
+        rr.TimeColumn("frame", sequence=frames),
+    ]
+    for group in columns:
+        stream.send_columns(rr.new_entity_path(path), indexes=index, columns=group, strict=True)
+
+
+def _marks(case: Case) -> Iterator[_Mark]:
+    """Yield where to look: each event that differs, and where a number first and most differs."""
+    for item in case.difference.signals:
+        level = "ERROR" if item.decides else "INFO"
+        name = item.signal.full_name
+        if item.events:
+            for event in item.events:
+                yield _Mark(_when(event), "INFO" if event.allowed else "ERROR", f"{name}: {wording.event(event)}")
+            continue
+        yield _Mark(item.first, level, f"{name}: differs for the first time")
+        worst = item.worst_abs
+        if worst is not None and worst.at != item.first:
+            error = wording.number(worst.error, item.signal.unit)
+            yield _Mark(worst.at, level, f"{name}: differs most, by {error}")
+
+
+def _when(event: Event) -> Moment:
+    at = event.baseline or event.candidate
+    assert at is not None
+    return at
+
+
+def _chart(item: SignalDifference) -> str:
+    """Return the chart that a signal is drawn in: one for each field, because a chart has one unit."""
+    unit = f" [{item.signal.unit}]" if item.signal.unit else ""
+    return f"{item.signal.topic.split('/')[1]} {item.signal.field}{unit}"
+
+
+def _charts(name: str) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
+    sides = [rr.new_entity_path([side, "values", name]) for side in (BASELINE, CANDIDATE)]
+    return rrb.Vertical(
+        rrb.TimeSeriesView(origin="/", contents=[f"+ {side}/**" for side in sides], name=name, plot_legend=legend),
+        rrb.TimeSeriesView(origin=rr.new_entity_path([DIFFERENCE, name]), name="difference", plot_legend=legend),
+        name=name,
+    )
+
+
+def _blueprint(marks: list[_Mark], charts: list[str]) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+    from rerun.blueprint.encodings import TextLogColumn
+
+    scene = rrb.Spatial3DView(
+        origin="/",
+        contents=[f"+ /{BASELINE}/scene/**", f"+ /{CANDIDATE}/scene/**"],
+        name="Baseline blue, candidate orange",
+    )
+    moments = rrb.TextLogView(
+        origin=f"/{DIFFERENCE}/moments",
+        name="Moments",
+        columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn(kind) for kind in ("LogLevel", "Body")]),
+    )
+    below = rrb.Tabs(moments, rrb.TextDocumentView(origin="/summary", name="Summary"), active_tab=0)
+    parts = [rrb.Tabs(*map(_charts, charts), active_tab=0)] if charts else []
+    selection: Any = None
+    if marks:
+        begin, end = (round(mark.at.time * 1e9) for mark in (marks[0], marks[-1]))
+        selection = rr.encodings.AbsoluteTimeRange(min=begin, max=end)
+    return rrb.Blueprint(
+        rrb.Horizontal(scene, rrb.Vertical(*parts, below, row_shares=[3, 2][-len(parts) - 1 :]), column_shares=[3, 2]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, time_selection=selection),
+        auto_views=False,
+    )

@@ -1,0 +1,60 @@
+"""Where two recordings come from, value by value."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from replay.comparison.difference import Change
+from replay.recording.provenance import Provenance
+
+FILES = "/files/"
+"""Begins the name of an input file in changes and rules: `/files/meshes/head.stl`."""
+_TEXTS = (".yaml", ".yml")
+
+
+def provenance_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
+    """Return what the recordings say of themselves that differs: versions, code, model, libraries and scenario texts.
+
+    The names behind the columns are not part of it: they are compared as signals. Bodies are part of the scene.
+    """
+    return _changes(_flat(baseline), _flat(candidate))
+
+
+def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
+    """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same."""
+    return _changes(_bodies(baseline), _bodies(candidate))
+
+
+def _bodies(provenance: Provenance) -> dict[str, str]:
+    return {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if not _is_text(name)}
+
+
+def _is_text(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in _TEXTS
+
+
+def _changes(a: Mapping[str, str], b: Mapping[str, str]) -> tuple[Change, ...]:
+    names = dict.fromkeys((*a, *b))
+    return tuple(Change(name, a.get(name), b.get(name)) for name in names if a.get(name) != b.get(name))
+
+
+def _flat(provenance: Provenance) -> dict[str, str]:
+    values = {
+        field.name: getattr(provenance, field.name)
+        for field in dataclasses.fields(provenance)
+        if field.name not in ("layout", "files")
+    }
+    texts = {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if _is_text(name)}
+    return {**dict(_leaves(values, "")), **texts}
+
+
+def _leaves(value: Any, name: str) -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping):
+        for key in sorted(value):
+            yield from _leaves(value[key], f"{name}.{key}" if name else str(key))
+    else:
+        yield name, value if isinstance(value, str) else json.dumps(value)

@@ -1,0 +1,35 @@
+"""The difference as one HTML page that needs no other file, no network and no script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from replay.comparison import wording
+from replay.comparison.plots import HEIGHT, LOWER, SHOWN, WIDTH, Plot
+from replay.comparison.runs import RunDifference
+
+
+def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
+    """Return the page; `plots` holds the drawings of each case, by its name."""
+    cases = [(case, {plot.signal: plot for plot in plots.get(case.name, ())}) for case in found.cases]
+    page: str = _template("report.html.j2").render(found=found, cases=cases, wording=wording, draw=draw, shown=SHOWN)
+    return page
+
+
+def draw(plot: Plot) -> Any:
+    """Return a drawing as markup that is safe to put into a page."""
+    from markupsafe import Markup
+
+    text = _template("plot.svg.j2").render(plot=plot, width=WIDTH, height=HEIGHT, lower=LOWER)
+    return Markup(text)  # rendered with autoescape
+
+
+@cache
+def _template(name: str) -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+    return environment.from_string(resources.files("replay.comparison").joinpath(name).read_text(encoding="utf-8"))

@@ -1,0 +1,64 @@
+"""The difference as a JUnit report: a test case for each scenario, failed when it differs."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from replay.comparison import wording
+from replay.comparison.difference import Verdict
+from replay.comparison.report_text import text
+from replay.comparison.runs import Case, RunDifference
+
+SUITE = "replay diff"
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(found: RunDifference) -> bytes:
+    """Return the report as UTF-8 XML; no times or host, because a diff has none."""
+    alone = [(name, "missing in the candidate") for name in found.missing]
+    alone += [(name, "only in the candidate") for name in found.extra]
+    failures = len(found.different) + sum(name not in found.ignored for name, _ in alone)
+    counts = {
+        "name": SUITE,
+        "tests": str(len(found.cases) + len(alone)),
+        "failures": str(failures),
+        "errors": "0",
+        "skipped": str(len(found.ignored)),
+    }
+    root = ElementTree.Element("testsuites", {key: counts[key] for key in ("name", "tests", "failures", "errors")})
+    suite = ElementTree.SubElement(root, "testsuite", counts)
+    for case in found.cases:
+        element = _case(suite, case.name)
+        if case.difference.verdict is Verdict.DIFFERENT:
+            message = wording.summary(case.difference)
+            _child(element, "failure", _details(found, case), message=message, type="different")
+    for name, where in alone:
+        element = _case(suite, name)
+        if name in found.ignored:
+            _child(element, "skipped", "", message=f"{where}; a rule accepts it")
+        else:
+            _child(element, "failure", f"scenario {name}: {where}", message=where, type="missing")
+    ElementTree.indent(root)
+    xml: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return xml + b"\n"
+
+
+def _details(found: RunDifference, case: Case) -> str:
+    return text(RunDifference(found.baseline, found.candidate, (case,)))
+
+
+def _case(suite: ElementTree.Element, name: str) -> ElementTree.Element:
+    attributes = {"name": _clean(name), "classname": SUITE, "time": "0"}
+    return ElementTree.SubElement(suite, "testcase", attributes)
+
+
+def _child(element: ElementTree.Element, tag: str, content: str, **attributes: str) -> None:
+    child = ElementTree.SubElement(element, tag, {key: _clean(value) for key, value in attributes.items()})
+    child.text = _clean(content)
+
+
+def _clean(value: str) -> str:
+    """Return text without the characters that XML cannot hold, not even escaped."""
+    return _NOT_XML.sub("�", value)

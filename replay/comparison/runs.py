@@ -1,0 +1,210 @@
+"""Recordings from files and run folders: two of one name at a time, and the verdict over all."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from replay.comparison.diff import compare
+from replay.comparison.difference import JSON_VERSION, Change, Difference, Verdict
+from replay.comparison.log_changes import same_messages, scene_changes, schema_changes
+from replay.comparison.rules import Rules
+from replay.errors import InvalidValue, RecordingError
+from replay.logs.mcap_reader import McapLog
+from replay.recording.reader import Recording, read, read_provenance
+
+SCENARIOS = "/scenarios"
+"""Begins the name of a scenario in rules: `/scenarios/carm_clear` with `ignore` lets it be missing or extra."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two recordings of one scenario, with what their files say beside the columns."""
+
+    baseline: Recording
+    candidate: Recording
+    scene: tuple[Change, ...] = ()
+    added: tuple[Change, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One scenario of two runs; `of_folders` when they are run folders and not single files."""
+
+    name: str
+    baseline: Path
+    candidate: Path
+    difference: Difference
+    of_folders: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RunDifference:
+    """How a candidate run differs from a baseline run.
+
+    Attributes:
+        baseline, candidate: what was compared: files or folders, as they were named.
+        cases: the scenarios that both have.
+        missing, extra: names of scenarios that only the baseline, only the candidate has.
+        ignored: names among these that a rule accepts.
+    """
+
+    baseline: str
+    candidate: str
+    cases: tuple[Case, ...]
+    missing: tuple[str, ...] = ()
+    extra: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Different when any scenario is, or is missing or extra without a rule."""
+        alone = any(name not in self.ignored for name in (*self.missing, *self.extra))
+        differs = alone or any(case.difference.verdict is Verdict.DIFFERENT for case in self.cases)
+        return Verdict.DIFFERENT if differs else Verdict.SAME
+
+    @property
+    def different(self) -> tuple[Case, ...]:
+        """The scenarios that differ."""
+        return tuple(case for case in self.cases if case.difference.verdict is Verdict.DIFFERENT)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return JSON values."""
+        cases = [
+            {"baseline": str(case.baseline), "candidate": str(case.candidate), **case.difference.as_json()}
+            for case in self.cases
+        ]
+        return {
+            "version": JSON_VERSION,
+            "verdict": self.verdict.value,
+            "baseline": self.baseline,
+            "candidate": self.candidate,
+            "scenarios": {"missing": list(self.missing), "extra": list(self.extra), "ignored": list(self.ignored)},
+            "cases": cases,
+        }
+
+
+def diff(
+    baseline: Recording | str | Path,
+    candidate: Recording | str | Path,
+    *,
+    rules: Rules | str | Path | None = None,
+    today: datetime.date | None = None,
+    strict_provenance: bool = False,
+) -> Difference:
+    """Return how a recording differs from another, by meaning.
+
+    Args:
+        baseline, candidate: recordings, or paths of MCAP files that `replay` wrote. Scene and schemas are compared only
+            for paths.
+        rules: tolerances, or the path of a rules file; without them everything must be equal.
+        today: the day on which the rules' expiry dates are judged, when `rules` is a path to rules that expire.
+        strict_provenance: other versions, models and inputs make the verdict "different".
+
+    Returns:
+        Everything that differs; `.verdict` is `Verdict.SAME` or `Verdict.DIFFERENT`.
+
+    Raises:
+        RecordingError: a file cannot be read or is no recording.
+        ScenarioError: the rules file is not valid.
+        InvalidValue: rules expire and `today` is missing.
+    """
+    if isinstance(rules, str | Path):
+        from replay.comparison.rules_file import read_rules
+
+        rules = read_rules(rules, today=today)
+    if isinstance(baseline, Recording) or isinstance(candidate, Recording):
+        a, b = (x if isinstance(x, Recording) else read(x) for x in (baseline, candidate))
+        pair = Pair(a, b)
+        return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
+    return diff_pair(read_pair(baseline, candidate), rules=rules, strict_provenance=strict_provenance)
+
+
+def read_pair(baseline: str | Path, candidate: str | Path) -> Pair:
+    """Read two recordings; when all their messages are the same bytes, unpack them once."""
+    with McapLog(baseline) as log_a, McapLog(candidate) as log_b:
+        if same_messages(log_a, log_b):
+            provenance = read_provenance(log_b)
+            recording = read(baseline)
+            if provenance.layout == recording.layout:
+                return Pair(recording, dataclasses.replace(recording, path=Path(candidate), provenance=provenance))
+        lost, added = schema_changes(log_a, log_b)
+        scene = (*scene_changes(log_a, log_b), *lost)
+    return Pair(read(baseline), read(candidate), scene, added)
+
+
+def diff_pair(pair: Pair, *, rules: Rules | None, strict_provenance: bool = False) -> Difference:
+    """Return how the recordings of a pair differ."""
+    return compare(
+        pair.baseline,
+        pair.candidate,
+        rules=rules,
+        strict_provenance=strict_provenance,
+        scene=pair.scene,
+        added=pair.added,
+    )
+
+
+def diff_runs(
+    baseline: str | Path,
+    candidate: str | Path,
+    *,
+    rules: Rules | None = None,
+    strict_provenance: bool = False,
+    visit: Callable[[Case, Pair], None] | None = None,
+) -> RunDifference:
+    """Return how two files, or two run folders, differ; scenarios of folders correspond by their paths inside.
+
+    Args:
+        baseline, candidate: two MCAP files or two folders with MCAP files in them.
+        rules: tolerances; without them everything must be equal.
+        strict_provenance: other versions, models and inputs make the verdict "different".
+        visit: called for each scenario while its columns are in memory, for reports that draw them.
+
+    Raises:
+        InvalidValue: one is a file and the other a folder, or a folder holds no recording.
+        RecordingError: a file cannot be read or is no recording.
+    """
+    rules = rules or Rules()
+    folders = Path(baseline).is_dir(), Path(candidate).is_dir()
+    if folders[0] != folders[1]:
+        raise InvalidValue(
+            "candidate", candidate, f"must be a {'folder' if folders[0] else 'file'}, as the baseline is"
+        )
+    if folders[0]:
+        a, b = _recordings(Path(baseline)), _recordings(Path(candidate))
+    else:
+        a, b = {"": Path(baseline)}, {"": Path(candidate)}
+    cases = []
+    for name in sorted(a.keys() & b.keys()):
+        pair = read_pair(a[name], b[name])
+        found = diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
+        case = Case(name or found.name, a[name], b[name], found, of_folders=folders[0])
+        if visit is not None:
+            visit(case, pair)
+        cases.append(case)
+    missing, extra = sorted(a.keys() - b.keys()), sorted(b.keys() - a.keys())
+    return RunDifference(
+        baseline=str(baseline),
+        candidate=str(candidate),
+        cases=tuple(cases),
+        missing=tuple(missing),
+        extra=tuple(extra),
+        ignored=tuple(name for name in (*missing, *extra) if rules.tolerance(f"{SCENARIOS}/{name}").ignore),
+    )
+
+
+def _recordings(folder: Path) -> dict[str, Path]:
+    """Return the recordings of a run folder by scenario: RUNDIR/<scenario>/<name>.mcap."""
+    found = {}
+    for path in sorted(folder.rglob("*.mcap")):
+        inside = path.relative_to(folder).with_suffix("")
+        name = inside.parent if inside.parent.name == inside.name else inside
+        found[name.as_posix()] = path
+    if not found:
+        raise RecordingError(str(folder), "holds no recording (*.mcap)")
+    return found

@@ -1,0 +1,173 @@
+"""The commands as a user meets them: output, files, exit codes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import replay
+from replay.cli.exit_codes import ExitCode, worst
+from replay.cli.main import run
+
+SCENARIO = """
+version: 1
+name: swing
+rate: 60 Hz
+duration: 1 s
+tags: [quick]
+links:
+  wall: {shapes: {slab: {type: cuboid, size: [0.1, 2, 2], pose: {xyz: [1.2, 0, 0]}}}}
+  arm:
+    joint: {name: swing, type: revolute, axis: [0, 1, 0], lower: -100 deg, upper: 100 deg}
+    shapes: {rod: {type: cuboid, size: [0.1, 0.1, 1], pose: {xyz: [0, 0, 0.5]}}}
+motion:
+  points: {swing: [{time: 0, position: 0}, {time: 1, position: 60 deg}]}
+sensors:
+  distance: {tip: {link: arm, pose: {xyz: [0, 0, 1], rpy: [0, 90 deg, 0]}, aperture: 20 deg, range: 3}}
+expect:
+  - {pair: [arm, wall], contact: EXPECTED}
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "swing.yaml"
+    path.write_text(SCENARIO.replace("EXPECTED", "never"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def recorded(scenario, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    assert run(["run", str(scenario), "-o", str(folder)]) is ExitCode.FINE
+    return folder / "swing"
+
+
+def test_run_leaves_the_run_folder_of_the_design(recorded):
+    assert sorted(file.name for file in recorded.iterdir()) == ["log.txt", "result.json", "swing.mcap", "swing.rrd"]
+    result = json.loads((recorded / "result.json").read_text())
+    assert result["status"] == "passed"
+    assert result["frames"] == 61
+    assert result["expectations"][0]["passed"] is True
+    summary = json.loads((recorded.parent / "run.json").read_text())
+    assert summary["scenarios"]["swing"]["status"] == "passed"
+    assert len(replay.read(recorded / "swing.mcap").time) == 61
+
+
+def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys):
+    before = (recorded / "swing.mcap").read_bytes()
+    assert run(["run", str(scenario), "-o", str(recorded.parent)]) is ExitCode.INVALID
+    assert "exists already; pass --overwrite" in capsys.readouterr().err
+    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite", "--no-rrd"]) is ExitCode.FINE
+    assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
+
+
+def test_a_broken_expectation_is_exit_code_4_and_named(tmp_path, capsys):
+    path = tmp_path / "swing.yaml"
+    path.write_text(SCENARIO.replace("EXPECTED", "always"))
+    assert run(["run", str(path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FAILED
+    assert "FAIL arm | wall: contact always" in capsys.readouterr().out
+
+
+def test_a_recording_runs_again_from_its_attachments_alone(recorded, tmp_path):
+    moved = tmp_path / "elsewhere.mcap"
+    moved.write_bytes((recorded / "swing.mcap").read_bytes())
+    assert run(["run", str(moved), "-o", str(tmp_path / "again"), "--no-rrd"]) is ExitCode.FINE
+    assert (tmp_path / "again" / "swing" / "swing.mcap").read_bytes() == moved.read_bytes()
+
+
+def test_nothing_selected_is_exit_code_5(scenario, tmp_path, capsys):
+    assert run(["run", str(scenario), "--select", "tag:none", "-o", str(tmp_path)]) is ExitCode.NOTHING
+    assert "nothing selected by tag:none" in capsys.readouterr().err
+    assert run(["validate", str(scenario), "--select", "sw*"]) is ExitCode.FINE
+
+
+def test_validate_says_place_value_rule_and_remedy(tmp_path, capsys):
+    path = tmp_path / "swing.yaml"
+    path.write_text(SCENARIO.replace("EXPECTED", "never").replace("60 deg", "60 cm"))
+    assert run(["validate", str(path)]) is ExitCode.INVALID
+    error = capsys.readouterr().err
+    assert "swing.yaml:13:" in error
+    assert "60 cm" in error
+
+
+def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
+    assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
+    entry = json.loads(capsys.readouterr().out)[0]
+    assert (entry["pairs"], entry["triangles"], entry["distance_sensors"]) == (1, 24, 1)
+
+
+def test_info_lists_topics_counts_and_provenance(recorded, capsys):
+    assert run(["info", str(recorded / "swing.mcap")]) is ExitCode.FINE
+    text = capsys.readouterr().out
+    assert "/distance/tip" in text
+    assert "replay.DistanceReading" in text
+    assert "distance exact@1" in text
+    assert "swing.yaml" in text
+    assert run(["info", str(recorded / "swing.mcap"), "--format", "json"]) is ExitCode.FINE
+    counts = {topic["topic"]: topic["messages"] for topic in json.loads(capsys.readouterr().out)["topics"]}
+    assert counts["/collision"] == counts["/tf"] == counts["/joint_states"] == 61
+
+
+def test_info_salvages_a_cut_file_with_exit_code_3(recorded, tmp_path, capsys):
+    data = (recorded / "swing.mcap").read_bytes()
+    part = tmp_path / "swing.mcap.part"
+    part.write_bytes(data[: len(data) * 9 // 10])
+    assert run(["info", str(part)]) is ExitCode.LOSSES
+    assert "salvaged" in capsys.readouterr().err
+    whole = tmp_path / "cut.mcap"
+    whole.write_bytes(part.read_bytes())
+    assert run(["info", str(whole)]) is ExitCode.INVALID
+
+
+def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
+    arguments = [
+        "export",
+        str(recorded / "swing.mcap"),
+        "--format",
+        "csv",
+        "-o",
+        str(tmp_path),
+        "--topic",
+        "/distance/*",
+    ]
+    assert run(arguments) is ExitCode.FINE
+    (written,) = capsys.readouterr().out.split()
+    assert "[m]" in Path(written).read_text().splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run"], "Missing argument"),
+        (["nonsense"], "No such command"),
+        (["info", "none.mcap"], "cannot be read"),
+        (["view", "none.rrd"], "no such file"),
+        (["view", "none.txt"], "neither a .rrd nor a .mcap"),
+        (["view", "none.rrd", "--at", "1"], "--at belongs to --screenshot"),
+        (["run", "none.yaml"], "is not there"),
+    ],
+)
+def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
+    assert run(arguments) is ExitCode.INVALID
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])
+def test_light_commands_load_nothing_heavy(arguments, scenario):
+    arguments = [str(scenario) if argument == "SCENARIO" else argument for argument in arguments]
+    heavy = ("numba", "rerun", "trimesh", "scipy", "matplotlib", "pyarrow", "fcl")
+    code = (
+        f"import sys; from replay.cli.main import run; code = run({arguments!r});"
+        f"print(int(code), [m for m in {heavy!r} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
+def test_exit_codes_win_in_the_order_of_the_design():
+    codes = [ExitCode(code) for code in (0, 5, 1, 3, 4, 2, 130)]
+    assert [worst(codes[: k + 1]) for k in range(len(codes))] == codes
+    assert worst([]) is ExitCode.FINE

@@ -1,0 +1,342 @@
+"""A difference as text, JSON, JUnit, HTML, suggested rules and a rerun overlay; and the command over them all."""
+
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from rerun.chunk import RrdReader
+
+from replay.cli import main
+from replay.comparison.difference import Verdict
+from replay.comparison.outputs import Outputs
+from replay.comparison.overlay import write_overlay
+from replay.comparison.plots import Curves, plots
+from replay.comparison.report_html import html
+from replay.comparison.report_junit import junit
+from replay.comparison.report_text import text
+from replay.comparison.rules import Rule, Rules, Tolerance
+from replay.comparison.rules_file import read_rules
+from replay.comparison.runs import Case, Pair, RunDifference, diff_pair, diff_runs
+from replay.comparison.suggest import MARK, round_up, suggest
+from replay.errors import InvalidValue, RecordingError, WriteError
+from tests.comparison import made_up
+
+BASELINE = made_up.recording()
+PAIR = "arm/beam|stand/base"
+DIGEST = BASELINE.provenance.files["meshes/beam.stl"]
+HOSTILE = "<script>alert(1)</script>\x07&'\""
+
+
+def change(recording):
+    recording.collision.level[40:42, 0] = 1
+    recording.distance.distance[20, 0] = np.nan
+    recording.distance.distance[20:40, 1] += 1e-3
+    recording.joint_positions[3, 0] = np.nextafter(recording.joint_positions[3, 0], 9.0)
+    recording.link_quaternions[5:9, 0, 0] += 1e-9
+    recording.collision.evaluated[20:22, 0] = False
+    recording.collision.clearance[20:22, 0] = np.nan
+
+
+CANDIDATE = made_up.with_provenance(
+    made_up.altered(BASELINE, change),
+    libraries={**BASELINE.provenance.libraries, "numpy": "9.9"},
+    files={**BASELINE.provenance.files, "meshes/beam.stl": "f" * 64},
+)
+
+
+def compared(name="made_up", rules=None):
+    pair = Pair(BASELINE, CANDIDATE)
+    case = Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(pair, rules=rules))
+    return RunDifference("a.mcap", "b.mcap", (case,)), pair
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Two run folders: `same` is equal, `other` differs, `gone` and `new` are in one only."""
+    root = tmp_path_factory.mktemp("runs")
+    for run, name, recording in (
+        ("a", "same", BASELINE),
+        ("b", "same", BASELINE),
+        ("a", "other", BASELINE),
+        ("b", "other", CANDIDATE),
+        ("a", "gone", BASELINE),
+        ("b", "new", BASELINE),
+    ):
+        made_up.write(recording, root / run / name / f"{name}.mcap")
+    return root
+
+
+def test_text_is_short_and_says_where_and_how_much():
+    found, _ = compared()
+    lines = text(found).splitlines()
+    assert lines == [
+        "different: made_up: 1 change of the scene, 6 of 55 signals changed, 1 difference of provenance",
+        "  provenance (does not decide)",
+        f"    libraries.numpy: {np.__version__} -> 9.9",
+        "  scene",
+        f"    /files/meshes/beam.stl: sha256 {DIGEST[:12]}... -> sha256 ffffffffffff...",
+        f"  changed: /collision/evaluated/{PAIR}",
+        "    1 event shifted; 2 of 100 frames differ",
+        "    evaluation of the clearance begins 2 frames later (+33.33 ms): "
+        "frame 20 (0.333333333 s) -> frame 22 (0.366666666 s)",
+        f"  changed: /collision/level/{PAIR}",
+        "    1 event shifted; 2 of 100 frames differ",
+        "    contact begins 2 frames later (+33.33 ms): frame 40 (0.666666666 s) -> frame 42 (0.7 s)",
+        "  changed: /distance/left/distance",
+        "    1 of 100 frames differ; first frame 20 (0.333333333 s)",
+        "    1 frame with NaN in place of a number, or the reverse",
+        "  changed: /distance/right/distance",
+        "    20 of 100 frames differ; first frame 20 (0.333333333 s)",
+        *lines[16:18],
+        "  changed: /joint_states/position/lift",
+        "    1 of 100 frames differ; first frame 3 (0.05 s)",
+        "    worst abs 2.78e-17 m (rel 1.58e-16) at frame 3 (0.05 s): 0.1755560760690452 -> 0.17555607606904522 m",
+        "  changed: /tf/rotation/arm",
+        "    4 of 100 frames differ; first frame 5 (0.083333333 s)",
+        lines[-1],
+    ]
+    assert lines[16].startswith("    worst abs 0.001 m at frame ")
+    assert lines[17].startswith("    worst rel 0.00174 at frame 39 (0.65 s): 0.57496115588506")
+
+
+def test_verbose_text_lists_what_the_rules_accept_and_why():
+    rules = Rules((Rule(("/joint_states/*",), Tolerance(abs=1e-12), "a known last digit", "https://x/1", None, "r:1"),))
+    found, _ = compared(rules=rules)
+    assert "within the rules: " not in text(found)
+    long = text(found, verbose=True)
+    assert "  within the rules: /joint_states/position/lift\n" in long
+    assert "rule abs 1e-12 (r:1): a known last digit (https://x/1)" in long
+
+
+def test_json_holds_all_of_it_and_is_json():
+    found, _ = compared()
+    values = json.loads(json.dumps(found.as_json(), allow_nan=False))
+    (case,) = values["cases"]
+    signals = {signal["signal"]["full_name"]: signal for signal in case["signals"]}
+    assert (values["verdict"], case["verdict"], case["compared"]) == ("different", "different", 55)
+    assert signals[f"/collision/level/{PAIR}"]["events"][0]["shift_frames"] == 2
+    assert signals["/distance/left/distance"]["nan"] == 1
+    assert signals["/distance/right/distance"]["worst_abs"]["error"] == pytest.approx(1e-3)
+    assert case["provenance"] == [{"name": "libraries.numpy", "baseline": np.__version__, "candidate": "9.9"}]
+
+
+def test_names_cannot_escape_from_a_report():
+    found, pair = compared(HOSTILE)
+    assert "\x07" not in text(found)
+    root = ElementTree.fromstring(junit(found))
+    assert root.find("testsuite/testcase").get("name") == HOSTILE.replace("\x07", "�")
+    page = html(found, {HOSTILE: plots(found.cases[0].difference, pair)})
+    assert "<script" not in page.lower()
+    assert "&lt;script&gt;alert(1)" in page
+
+
+def test_junit_counts_failures_and_skips(folders):
+    rules = Rules((Rule(("/scenarios/new",), Tolerance(ignore=True), "new"),))
+    found = diff_runs(folders / "a", folders / "b", rules=rules)
+    suite = ElementTree.fromstring(junit(found)).find("testsuite")
+    assert {key: suite.get(key) for key in ("tests", "failures", "errors", "skipped")} == {
+        "tests": "4",
+        "failures": "2",
+        "errors": "0",
+        "skipped": "1",
+    }
+    outcome = {case.get("name"): [child.tag for child in case] for case in suite.iter("testcase")}
+    assert outcome == {"same": [], "other": ["failure"], "gone": ["failure"], "new": ["skipped"]}
+    assert "contact begins 2 frames later" in suite.find("testcase[@name='other']/failure").text
+
+
+class Page(HTMLParser):
+    """Collects tags and attributes, and that every element is closed in order."""
+
+    VOID = frozenset({"meta", "br"})
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.open = [], []
+        self.feed(page)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_page_needs_nothing_else_and_draws_every_signal():
+    found, pair = compared()
+    drawn = plots(found.cases[0].difference, pair)
+    page = Page(html(found, {"made_up": drawn}))
+    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "img", "iframe", "object")]
+    assert not [value for _, pairs in page.tags for key, value in pairs.items() if key in ("src", "href")]
+    labels = [pairs["aria-label"] for tag, pairs in page.tags if tag == "svg" and "aria-label" in pairs]
+    assert len(labels) == len(drawn) == 6
+    paths = [pairs["d"] for tag, pairs in page.tags if tag == "path"]
+    assert all(path.startswith("M") and "nan" not in path and "inf" not in path for path in paths)
+
+
+def test_drawings_keep_peaks_and_gaps_of_long_signals():
+    long = made_up.recording(60_000)
+
+    def spike(recording):
+        recording.joint_positions[41_234, 0] = 1e3
+        recording.joint_positions[10_000:30_000, 1] = np.nan
+        recording.capacitive.capacitance[7, 0] = np.inf
+        recording.joint_velocities[9, 0] = 1.7e308
+
+    pair = Pair(long, made_up.altered(long, spike))
+    drawn = {plot.signal: plot for plot in plots(diff_pair(pair, rules=None), pair)}
+    assert len(drawn) == 4
+    position = drawn["/joint_states/position/lift"]
+    assert position.high == 1e3
+    assert len(position.candidate) < 40_000
+    assert drawn["/joint_states/position/turn"].candidate.count("M") == 2
+    curve = Curves(pair).curve(diff_pair(pair, rules=None).signals[0])
+    assert len(curve.seconds) == 60_000
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (1.0, "1.0e+0"),
+        (1.01, "1.1e+0"),
+        (0.0999, "1.0e-1"),
+        (5e-324, "5.0e-324"),
+        (2.775e-17, "2.8e-17"),
+        (99.1, "1.0e+2"),
+    ],
+)
+def test_tolerances_are_rounded_up_to_two_digits(value, expected):
+    assert round_up(value) == expected
+    assert float(round_up(value)) >= value
+
+
+def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
+    def calm(recording):
+        change(recording)
+        recording.distance.distance[20, 0] = BASELINE.distance.distance[20, 0]
+
+    pair = Pair(BASELINE, made_up.altered(BASELINE, calm))
+    found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=None)),))
+    path = tmp_path / "rules.yaml"
+    path.write_text(suggest(found), encoding="utf-8")
+    rules = read_rules(path)
+    assert len(rules.active) == 4  # both state signals need two frames and share a rule
+    assert all(rule.reason.startswith(MARK) for rule in rules.active)
+    assert diff_pair(pair, rules=rules).verdict is Verdict.SAME
+    for k, rule in enumerate(rules.active):
+        tolerance = rule.tolerance
+        tighter = Tolerance(abs=tolerance.abs * 0.9, frames=max(0, tolerance.frames - 1))
+        others = [*rules.active[:k], Rule(rule.signals, tighter, "tighter"), *rules.active[k + 1 :]]
+        assert diff_pair(pair, rules=Rules(tuple(others))).verdict is Verdict.DIFFERENT
+
+
+def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
+    found, _ = compared()
+    path = tmp_path / "rules.yaml"
+    path.write_text(suggest(found), encoding="utf-8")
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#   ")]
+    assert [line.split(":")[0] for line in comments] == ['#   "/distance/left/distance', '#   "made_up']
+    remaining, _ = compared(rules=read_rules(path))
+    assert [item.signal.full_name for item in remaining.cases[0].difference.deciding] == ["/distance/left/distance"]
+
+
+def test_run_folders_correspond_by_scenario(folders):
+    seen = []
+    found = diff_runs(folders / "a", folders / "b", visit=lambda case, pair: seen.append(case.name))
+    assert (found.missing, found.extra, seen) == (("gone",), ("new",), ["other", "same"])
+    assert [case.name for case in found.different] == ["other"]
+    assert found.verdict is Verdict.DIFFERENT
+    assert text(found).endswith("different: 1 of 2 scenarios differ, 1 missing, 1 extra\n")
+    with pytest.raises(InvalidValue, match="must be a folder"):
+        diff_runs(folders / "a", folders / "b" / "same" / "same.mcap")
+    (folders / "none").mkdir()
+    with pytest.raises(RecordingError, match="holds no recording"):
+        diff_runs(folders / "a", folders / "none")
+
+
+def test_the_overlay_shows_both_runs_and_the_moments(folders, tmp_path):
+    pairs = {}
+    found = diff_runs(folders / "a", folders / "b", visit=lambda case, pair: pairs.setdefault(case.name, pair))
+    path = tmp_path / "overlay.rrd"
+    write_overlay(path, found.different[0], pairs["other"])
+    columns = {}
+    for chunk in RrdReader(str(path)).stream():
+        batch = chunk.to_record_batch()
+        for name, column in zip(batch.schema.names, batch.columns, strict=True):
+            if ":" in name and pa.types.is_list(column.type):
+                columns[str(chunk.entity_path), name.rpartition(":")[2]] = column.to_pylist()
+    entities = {entity for entity, _ in columns}
+    assert {"/baseline/scene/arm/beam", "/candidate/scene/arm/beam", "/summary"} <= entities
+    assert columns["/baseline/scene/arm/beam", "albedo_factor"] != columns["/candidate/scene/arm/beam", "albedo_factor"]
+    errors = next(v for (entity, kind), v in columns.items() if "right" in entity and entity.startswith("/difference"))
+    assert len(errors) == 100
+    texts = [row[0] for row in columns["/difference/moments", "text"]]
+    assert texts[0].startswith("first difference: /joint_states/position/lift")
+    assert any("contact begins 2 frames later" in line for line in texts)
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Return what `replay diff` returns and writes to stdout and stderr."""
+    monkeypatch.setitem(main.COMMANDS, "diff", "")
+
+    def call(*arguments):
+        code = main.run(["diff", *map(str, arguments)])
+        return (int(code), *capsys.readouterr())
+
+    return call
+
+
+def test_the_command_says_it_by_its_exit_code(folders, tmp_path, run):
+    same = folders / "a" / "same" / "same.mcap", folders / "b" / "same" / "same.mcap"
+    other = folders / "a" / "other" / "other.mcap", folders / "b" / "other" / "other.mcap"
+    assert run(*same) == (0, "same: made_up: all 55 signals equal in 100 frames\n", "")
+    code, out, _ = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
+    assert (code, json.loads(out)["verdict"]) == (1, "different")
+    assert "contact begins" in (tmp_path / "new" / "d.html").read_text(encoding="utf-8")
+    ElementTree.fromstring((tmp_path / "d.xml").read_bytes())
+    code, out, _ = run(*other, "--suggest-rules")
+    assert (code, MARK in out) == (1, True)
+    code, out, _ = run(folders / "a", folders / "b", "-v", "--rrd", tmp_path / "overlays")
+    assert code == 1
+    assert [path.name for path in (tmp_path / "overlays").iterdir()] == ["other.rrd"]
+
+
+def test_the_command_says_what_it_cannot_read(folders, tmp_path, run):
+    good = folders / "a" / "same" / "same.mcap"
+    code, _, err = run(tmp_path / "none.mcap", good)
+    assert (code, "none.mcap: cannot be read: No such file" in err) == (2, True)
+    code, _, err = run(good, folders)
+    assert (code, "must be a file" in err) == (2, True)
+    damaged = bytearray(good.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "damaged.mcap").write_bytes(damaged)
+    code, _, err = run(good, tmp_path / "damaged.mcap")
+    assert (code, "damaged" in err) == (2, True)
+    (tmp_path / "rules.yaml").write_text("rules_version: 1\nrules: [{signal: x}]\n")
+    code, _, err = run(good, good, "--rules", tmp_path / "rules.yaml")
+    assert (code, "rules.yaml:2:18: rules[0].signal = 'x'" in err) == (2, True)
+    assert run(good)[0] == 2
+
+
+def test_the_command_applies_rules(folders, tmp_path, run):
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules_version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
+    assert run(folders / "a", folders / "b", "--rules", rules)[0] == 0
+    assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance")[0] == 1
+
+
+def test_a_report_that_cannot_be_written_is_an_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(WriteError):
+        Outputs(junit=tmp_path / "file" / "d.xml").write(compared()[0])

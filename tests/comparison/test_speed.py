@@ -1,0 +1,68 @@
+"""Time and memory of a diff of two long recordings, in a process of its own."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tests.comparison import made_up
+
+FRAMES = 60_000
+LAYOUT = dataclasses.replace(
+    made_up.LAYOUT,
+    distance_sensors=tuple(f"d{k:02}" for k in range(18)),
+    capacitive_sensors=tuple(f"c{k}" for k in range(9)),
+)  # with /tf, /joint_states and /collision: 30 topics
+
+MEASURE = """
+import json, resource, sys, time
+from replay.comparison.runs import diff
+begin = time.perf_counter()
+found = diff(*sys.argv[1:])
+seconds = time.perf_counter() - begin
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+print(json.dumps([found.verdict.value, len(found.signals), found.compared, seconds, peak]))
+"""
+
+
+def disturb(columns):
+    """Change every number of every frame, and move every event."""
+    rng = np.random.default_rng(1)
+    for field in dataclasses.fields(columns):
+        values = getattr(columns, field.name)
+        if dataclasses.is_dataclass(values) and field.name in ("collision", "distance", "capacitive"):
+            disturb(values)
+        elif field.name == "link_poses":
+            values[..., :3, 3] += 1e-6
+        elif field.name == "link_quaternions":
+            values[:] = np.roll(values, 1, axis=0)
+        elif isinstance(values, np.ndarray) and values.dtype == np.float64:
+            values += 1e-6 * rng.normal(size=values.shape)
+        elif isinstance(values, np.ndarray) and values.dtype != np.int64:
+            values[:] = np.roll(values, 3, axis=0)
+
+
+def measure(*paths):
+    done = subprocess.run([sys.executable, "-c", MEASURE, *map(str, paths)], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.soak
+def test_long_recordings_are_compared_in_bounded_time_and_memory(tmp_path):
+    recording = made_up.recording(FRAMES, LAYOUT)
+    baseline = made_up.write(recording, tmp_path / "a.mcap")
+    again = made_up.write(recording, tmp_path / "b.mcap")
+    disturb(recording)
+    other = made_up.write(recording, tmp_path / "c.mcap")
+    verdict, signals, _, seconds, peak = measure(baseline, again)
+    assert (verdict, signals) == ("same", 0)
+    assert seconds <= 5.0
+    assert peak <= 1024.0
+    verdict, signals, compared, seconds, peak = measure(baseline, other)
+    assert verdict == "different"
+    assert signals >= 0.8 * compared
+    assert seconds <= 30.0
+    assert peak <= 1024.0
