@@ -117,6 +117,12 @@ def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: 
 @kernel
 def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
     """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE."""
+    if outside != NONE:
+        farthest = polygon[0, outside]
+        for k in range(1, count):
+            farthest = max(farthest, polygon[k, outside])
+        if farthest <= 0.0:
+            return 0
     first = border if outside == NONE else outside
     sign = -1.0 if outside == NONE else 1.0
     kept = 0
