@@ -122,13 +122,11 @@ def _on_border(corners: Wide, v: Wide, h: np.longdouble) -> float:
     # n.w is one wave: on the hits it is largest at its crest, hence about the best sample, or where a run of hits ends
     height = np.where(hit, rays(f) @ normal, -np.inf)
     crest = int(np.argmax(height))
-    ends = [_last_hit(inside, f[k], _step(f, k, side)) for k, side in _ends(hit)]
-    low, high = (
-        f[crest] if not hit[(crest + side) % len(f)] else _step(f, crest, side) for side in (-1, 1)
-    )
+    ends = {(k, side): _last_hit(inside, f[k], _step(f, k, side)) for k, side in _ends(hit)}
+    low, high = (ends.get((crest, side), _step(f, crest, side)) for side in (-1, 1))
     reached = max(height[crest], _highest(lambda x: rays(x) @ normal, low, high))
     if ends:
-        reached = max(reached, (rays(np.array(ends)) @ normal).max())
+        reached = max(reached, (rays(np.array(list(ends.values()))) @ normal).max())
     return float(delta / reached) if reached > 0 else math.inf
 
 
@@ -157,7 +155,9 @@ def _samples(sides: Wide, e1: Wide, e2: Wide, v: Wide, h: np.longdouble) -> Wide
         near += [g, *(g + half - steps), *(g + half + steps), *(g - half - steps), *(g - half + steps)]
     crossings = np.array(near, dtype=np.longdouble)
     between = 0.5 * (np.sort(crossings)[1:] + np.sort(crossings)[:-1])
-    return np.sort(np.mod(np.concatenate([even, crossings, between]), 2 * np.longdouble(np.pi)))
+    angles = np.sort(np.mod(np.concatenate([even, crossings, between]), 2 * np.longdouble(np.pi)))
+    # of two that are one to rounding, neither would be seen to be beside a crest
+    return angles[np.diff(angles, prepend=angles[-1] - 7.0) > 1e-14]
 
 
 def _last_hit(inside: Callable[[Wide], Wide], hit: np.longdouble, miss: np.longdouble) -> np.longdouble:
