@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,3 +173,33 @@ def _add_growth(report: Report, *, most: int, rounds: int) -> None:
     report.tables["an exact query against the number of triangles"] = rows
     report.plots.append(Plot("exact cone", "triangles", "s per query", {EXACT: points}, joined=True))
     report.notes.append(f"An exact query grows like n^{exponent(points):.2f} in the number of triangles.")
+
+
+def read_once(method: str, question: dict[str, Any], *, engine: str = "own", count: int = 1000) -> float:
+    """Return one reading [m] of a model version, "thesis" or "rays"; inf when it detects nothing.
+
+    Args:
+        method: see above.
+        question: triangles, apex, axis, aperture.
+        engine, count: of "rays".
+    """
+    triangles, aperture = question["triangles"], question["aperture"]
+    pose = np.identity(4)
+    x, y = _across(question["axis"])
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, question["axis"], question["apex"]
+    poses, nearest = pose[None].copy(), nothing_yet(1)
+    if method == "thesis":
+        sweep_thesis(triangles, poses, half_angle(aperture)[0], np.inf, 0, nearest)
+    elif engine == "embree":
+        EmbreeBundle(triangles).sweep(poses, cap_directions(aperture, count), np.inf, 0, nearest)
+    else:
+        target = make_target("t", 0, triangles)
+        sweep_rays(triangles, target.tree, poses, cap_directions(aperture, count), np.inf, 0, nearest)
+    return float(nearest.distance[0])
+
+
+def _across(axis: Floats) -> tuple[Floats, Floats]:
+    """Return two unit vectors that make a right-handed frame with an axis."""
+    x = np.cross(axis, np.identity(3)[int(np.argmin(np.abs(axis)))])
+    x = x / math.sqrt(float(np.sum(x * x)))
+    return x, np.cross(axis, x)
