@@ -49,6 +49,7 @@ class CapacitiveSensor:
         coupling: C_couple [F], > 0.
         permittivity: eps [F/m], > 0; a fitted number (see METHODS 4.3), the vacuum's unless calibrated.
         supply: V_in [V].
+        stray_capacitance: C_0 [F], >= 0; added to what is sensed.
         side: "front" counts what lies on the side of the plate's normal, "both" counts all.
         faces: "all" counts every triangle; "facing" counts those whose outer side the plate's centre lies on, strictly:
             n.(c - a) > 0 for the outward normal n, a corner a and the centre c.
@@ -61,6 +62,7 @@ class CapacitiveSensor:
     coupling: float
     permittivity: float = VACUUM_PERMITTIVITY
     supply: float = 2.5
+    stray_capacitance: float = 0.0
     side: str = "front"
     faces: str = "all"
     ignored_links: frozenset[int] = field(default_factory=frozenset)
@@ -73,6 +75,8 @@ class CapacitiveSensor:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InvalidValue(f"{place}: {name}", value, "must be finite and > 0")
+        if not (np.isfinite(self.stray_capacitance) and self.stray_capacitance >= 0.0):
+            raise InvalidValue(f"{place}: stray_capacitance", self.stray_capacitance, "must be finite and >= 0")
         if self.side not in SIDES:
             raise InvalidValue(f"{place}: side", self.side, f"must be one of {', '.join(SIDES)}")
         if self.faces not in FACES:

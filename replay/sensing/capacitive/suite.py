@@ -96,7 +96,7 @@ class CapacitiveSuite:
                 integral, touches = self._integrate(s, t, T_plate_body)
                 per_object[:, s, t] = sensor.permittivity * _sum_over_plates(integral)[frame_of]
                 touching[:, s] |= np.any(touches, axis=1)[frame_of]
-        capacitance = np.zeros((frames, len(self.sensors)))
+        capacitance = np.tile(np.array([sensor.stray_capacitance for sensor in self.sensors]), (frames, 1))
         for t in range(len(self.targets)):
             capacitance += per_object[:, :, t]
         voltage = np.empty_like(capacitance)
