@@ -24,6 +24,7 @@ COMMANDS = {
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
     "view": "show recordings in the rerun viewer, or make a picture",
+    "bench": "time methods and peers on the same questions, and check their answers",
 }
 """Help by name of command; each is the function of that name in the module of that name."""
 
