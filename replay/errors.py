@@ -112,5 +112,19 @@ class WorkerError(ReplayError):
         super().__init__(f"worker processes cannot be started: {reason}")
 
 
+class CurveError(ReplayError):
+    """A file with a measured curve cannot be read, or one of its rows cannot be used."""
+
+    def __init__(self, file: str, line: int | None, reason: str) -> None:
+        self.file = file
+        self.line = line
+        self.reason = reason
+        super().__init__(f"{file}: {reason}" if line is None else f"{file}:{line}: {reason}")
+
+
+class CalibrationError(ReplayError):
+    """A curve does not determine what was to be fitted to it, or what it determines cannot be a sensor's."""
+
+
 class ViewerError(ReplayError):
     """The rerun viewer could not show or render a recording."""

@@ -168,7 +168,9 @@ def run_all(
                 watch.done(result)
     except KeyboardInterrupt:
         interrupted = True
-    for scenario in scenarios:
+    for scenario in scenarios if interrupted else ():
+        if scenario.name not in results:
+            _remove_unfinished(directory / scenario.name)
         lost = CaseResult(scenario.name, Status.INTERRUPTED, error="the run was ended before this scenario was")
         results.setdefault(scenario.name, lost)
     seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
@@ -230,6 +232,13 @@ def _finish(result: CaseResult, folder: Path) -> None:
             log.writelines(f"{line}\n" for line in describe(result))
     except OSError as error:
         raise WriteError(str(folder / "log.txt"), error.strerror or str(error)) from None
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what a scenario that was ended has written; what an earlier run left stays."""
+    for file in (*folder.glob("*.part"), folder / "log.txt"):
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
 
 
 def as_json(run: Run) -> dict[str, object]:

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from replay.cli import interruption
+
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
 
@@ -19,7 +21,7 @@ class RunProgress:
     def __init__(self) -> None:
         self._console = Console(stderr=True, highlight=False)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        self._bars = Progress(*columns, console=self._console, transient=True)
+        self._bars = Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
         self._all = self._bars.add_task("scenarios", total=None)
         self._running: dict[str, TaskID] = {}
         self._costs: dict[str, float] = {}
@@ -36,12 +38,14 @@ class RunProgress:
 
     def plan(self, costs: dict[str, float]) -> None:
         """Begin to count."""
+        interruption.check()
         self._costs = costs
         self._begin = time.monotonic()
         self._bars.update(self._all, total=len(costs))
 
     def follow(self, name: str, done: int, total: int) -> None:
         """Show how far a running scenario is."""
+        interruption.check()
         if name not in self._running:
             self._running[name] = self._bars.add_task(f"  {escape(name)}", total=None)
         if total:
@@ -50,6 +54,7 @@ class RunProgress:
 
     def done(self, result: CaseResult) -> None:
         """Count a scenario."""
+        interruption.check()
         self._done += 1
         self._failed += result.status.value != "passed"
         self._cost_done += self._costs.get(result.name, 0.0)

@@ -260,6 +260,7 @@ def _capacitive_sensor(scenario: Scenario, machine: Linkage, name: str) -> Capac
         coupling=written.coupling,
         permittivity=written.permittivity,
         supply=written.supply,
+        stray_capacitance=written.stray_capacitance,
         side=written.side,
         faces=written.faces,
         ignored_links=_ignored(machine, written.ignore),

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from replay.scenario.fields import Glob, Name, Part, Pose, Size2, rejected
-from replay.scenario.units import Aperture, Capacitance, Distance, Permittivity, Range, Supply
+from replay.scenario.units import Aperture, Capacitance, Distance, Permittivity, Range, StrayCapacitance, Supply
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
@@ -57,6 +57,8 @@ class CapacitiveSensor(Part):
     """Coupling capacitance of the voltage divider [F]."""
     permittivity: Permittivity = VACUUM_PERMITTIVITY
     """[F/m]; a fitted number, see METHODS 4.3."""
+    stray_capacitance: StrayCapacitance = 0.0
+    """What the sensor reads while nothing is near [F]: cables and its own surroundings; added to what is sensed."""
     supply: Supply = 2.5
     """Supply voltage [V]."""
     side: Literal["front", "both"] = "front"

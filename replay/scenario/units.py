@@ -273,6 +273,7 @@ MaxAngularAcceleration = Annotated[
     float, Quantity("MaxAngularAcceleration", ANGULAR_ACCELERATION, at_least=_SMALL, infinite=True)
 ]
 Capacitance = Annotated[float, Quantity("Capacitance", CAPACITANCE, at_least=1e-18, at_most=1.0)]
+StrayCapacitance = Annotated[float, Quantity("StrayCapacitance", CAPACITANCE, at_least=0.0, at_most=1.0)]
 Permittivity = Annotated[float, Quantity("Permittivity", PERMITTIVITY, at_least=1e-18, at_most=1.0)]
 Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1e6)]
 Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]

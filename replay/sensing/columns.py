@@ -52,7 +52,7 @@ class CapacitiveColumns:
     """Readings of C capacitive sensors in n frames.
 
     Attributes:
-        capacitance: (n, C) [F], inf when saturated.
+        capacitance: (n, C) [F], inf when saturated: the sum of per_object and the sensor's stray capacitance.
         per_object: (n, C, O) [F], what each sensed shape contributes; 0 for shapes the sensor ignores.
         output_voltage: (n, C) [V]; 0 when saturated.
         delta_output: (n, C) [V], supply minus output voltage.

@@ -44,6 +44,8 @@ def misbehave(order, progress):
         case "crash":
             print("about to crash")
             os._exit(139)
+        case "raise":
+            raise MemoryError("no room for 8 GiB")
         case "hang":
             time.sleep(3600)
         case "eat":

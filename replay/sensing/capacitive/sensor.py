@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics import transforms
 from replay.sensing.capacitive.integral import SIDES, check_half_size
 
 Floats = NDArray[np.float64]
@@ -33,8 +34,8 @@ class Plate:
 
     def __post_init__(self) -> None:
         check_half_size(self.half_size)
-        if np.shape(self.T_link_plate) != (4, 4) or not np.isfinite(self.T_link_plate).all():
-            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a finite (4, 4) pose")
+        if np.shape(self.T_link_plate) != (4, 4) or not _is_rigid(np.asarray(self.T_link_plate, dtype=np.float64)):
+            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a rigid (4, 4) pose")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,7 @@ class CapacitiveSensor:
         coupling: C_couple [F], > 0.
         permittivity: eps [F/m], > 0; a fitted number (see METHODS 4.3), the vacuum's unless calibrated.
         supply: V_in [V].
+        stray_capacitance: C_0 [F], >= 0; added to what is sensed.
         side: "front" counts what lies on the side of the plate's normal, "both" counts all.
         faces: "all" counts every triangle; "facing" counts those whose outer side the plate's centre lies on, strictly:
             n.(c - a) > 0 for the outward normal n, a corner a and the centre c.
@@ -60,6 +62,7 @@ class CapacitiveSensor:
     coupling: float
     permittivity: float = VACUUM_PERMITTIVITY
     supply: float = 2.5
+    stray_capacitance: float = 0.0
     side: str = "front"
     faces: str = "all"
     ignored_links: frozenset[int] = field(default_factory=frozenset)
@@ -72,6 +75,8 @@ class CapacitiveSensor:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InvalidValue(f"{place}: {name}", value, "must be finite and > 0")
+        if not (np.isfinite(self.stray_capacitance) and self.stray_capacitance >= 0.0):
+            raise InvalidValue(f"{place}: stray_capacitance", self.stray_capacitance, "must be finite and >= 0")
         if self.side not in SIDES:
             raise InvalidValue(f"{place}: side", self.side, f"must be one of {', '.join(SIDES)}")
         if self.faces not in FACES:
@@ -80,3 +85,10 @@ class CapacitiveSensor:
     def senses(self, link: int) -> bool:
         """Return whether shapes on a link are sensed."""
         return link != self.link and link not in self.ignored_links
+
+
+def _is_rigid(T: Floats) -> bool:
+    if not np.isfinite(T).all() or not np.array_equal(T[3], [0.0, 0.0, 0.0, 1.0]):
+        return False
+    products = transforms.compose(transforms.invert(T), T)[:3, :3]
+    return bool(np.abs(products - np.eye(3)).max() < 1e-9 and np.linalg.det(T[:3, :3]) > 0.0)

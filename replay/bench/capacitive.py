@@ -1,0 +1,199 @@
+"""The capacitive sensor: closed form, the thesis's splits and our tree, time against error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.bench.inputs import around, box_surface, phantom, slivers, torus
+from replay.bench.measure import Check, Contender, Goal, Row, absent, compete, exponent, ratio
+from replay.bench.report import Plot, Report, pareto_plot
+from replay.errors import MissingPackageError
+from replay.geometry.primitives import plane
+from replay.geometry.tree import triangle_tree
+from replay.numerics import transforms
+from replay.sensing.capacitive.clusters import make_clusters
+from replay.sensing.capacitive.tree_sum import sum_tree
+from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
+
+Floats = NDArray[np.float64]
+Answer = Callable[[], Floats]
+
+PLATE = np.array([[0.025, 0.1]])
+"""Half size of a guard plate of the C-arm [m]: 5 cm x 20 cm."""
+
+TOLERANCES = tuple(10.0**-k for k in range(2, 10))
+SPLITS = tuple(range(8))
+SLACK = 1e-12
+"""Relative rounding of a sum of many triangles, allowed beside a tolerance."""
+
+BODIES: dict[str, Callable[[], Floats]] = {
+    "box, 12 triangles": lambda: box_surface((0.6, 0.5, 0.4)),
+    "slivers, 1 000 triangles": lambda: slivers(1_000),
+    "phantom, 1 000 triangles": lambda: phantom(1_000),
+    "phantom, 26 756 triangles": lambda: phantom(26_756),
+}
+LARGE = "phantom, 26 756 triangles"
+INCLINED = "experiment I: inclined plate in front of a sensor plate"
+
+
+def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str] = tuple(BODIES)) -> Report:
+    """Run the capacitive benchmarks.
+
+    Args:
+        quick: fewer poses, and splits as far as a second allows; about a minute.
+        rounds: times that every contender is timed; 5, or 3 when quick, if None.
+        bodies: which of `BODIES`.
+    """
+    rounds = rounds or (3 if quick else 5)
+    report = Report("capacitive")
+    rows, best = inclined_plate(rounds)
+    report.tables[INCLINED] = rows
+    report.plots.append(_plot(INCLINED, rows))
+    what = f"exact integral against the splits that reach 1e-6 (n = {best}), experiment I"
+    measured = math.nan if best is None else ratio(rows, INCLINED, f"midpoint n={best}", "exact")
+    report.goals.append(Goal(what, ">= 100x", measured, 100.0))
+    for name in bodies:
+        try:
+            triangles = BODIES[name]()
+        except MissingPackageError as error:
+            report.tables[name] = [absent(name, "exact", str(error))]
+            continue
+        poses = 6 if quick else 30
+        points = (2_000_000 if quick else 200_000_000) // (poses * len(triangles))
+        splits = [n for n in SPLITS if n <= 2 or 4**n <= points]
+        report.tables[name] = on_body(name, triangles, poses=poses, splits=splits, rounds=rounds)
+        report.plots.append(_plot(name, report.tables[name]))
+    large = report.tables.get(LARGE, [])
+    for rtol, required in ((1e-6, 20.0), (1e-4, 100.0)):
+        measured = ratio(large, LARGE, "exact", f"tree rtol {rtol:.0e}")
+        report.goals.append(Goal(f"tree at {rtol:.0e} against exact, {LARGE}", f">= {required:g}x", measured, required))
+    excess = [
+        row.worst_error / float(row.method.split()[-1])
+        for several in report.tables.values()
+        for row in several
+        if row.method.startswith("tree")
+    ]
+    worst = max(excess, default=math.nan)
+    report.goals.append(Goal("tree, worst error over rtol", "<= 1", worst, 1.0 + 1e-3, "", at_least=False))
+    _add_growth(report, most=26_756 if quick else 1_000_000, rounds=rounds)
+    return report
+
+
+def inclined_plate(rounds: int) -> tuple[list[Row], int | None]:
+    """Return the rows of the thesis's experiment I, and the fewest splits that reach 1e-6.
+
+    A 20 cm x 20 cm sensor plate and a 10 cm x 10 cm plate 5 cm in front of it, inclined by 0..45 degrees: the set-up in
+    which the thesis compares its splits with its closed form, which it has in front of the plate only.
+    """
+    triangles = plane((0.1, 0.1)).triangles
+    poses = transforms.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.radians(np.linspace(0.0, 45.0, 16)))
+    poses[:, 2, 3] = 0.05
+    half = np.array([[0.1, 0.1]])
+    rows = _race(INCLINED, triangles, poses, half, range(11), (1e-4, 1e-6, 1e-9), rounds)
+    enough = [n for n in range(11) if _error(rows, f"midpoint n={n}") <= 1e-6]
+    return rows, min(enough, default=None)
+
+
+def _error(rows: Sequence[Row], method: str) -> float:
+    return next((row.worst_error for row in rows if row.method == method), math.inf)
+
+
+def on_body(name: str, triangles: Floats, *, poses: int, splits: Sequence[int], rounds: int) -> list[Row]:
+    """Return the rows of all methods on one body; plates stand 1 cm to 1.5 m off it, tilted up to 60 degrees."""
+    T_body_plate = around(triangles, poses, near=0.01, far=1.5, tilt=math.radians(60.0))
+    return _race(name, triangles, transforms.invert(T_body_plate), PLATE, splits, TOLERANCES, rounds)
+
+
+def _race(
+    case: str,
+    triangles: Floats,
+    T_plate_body: Floats,
+    half: Floats,
+    splits: Sequence[int],
+    tolerances: Sequence[float],
+    rounds: int,
+) -> list[Row]:
+    """Time closed form, splits and tree; the closed form is the reference, itself judged by `replay bench stability`."""
+    poses = np.ascontiguousarray(T_plate_body[:, None])
+    areas, tree = triangle_areas(triangles), triangle_tree(triangles)
+    clusters = make_clusters(triangles, tree)
+    truth = sum_triangles(triangles, areas, poses, half, False, False, EXACT)[0].ravel()
+
+    def by_triangles(number: int) -> Answer:
+        return lambda: sum_triangles(triangles, areas, poses, half, False, False, number)[0].ravel()
+
+    def by_tree(rtol: float) -> Answer:
+        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0].ravel()
+
+    def contender(name: str, answer: Answer, tolerance: float) -> Contender:
+        return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))
+
+    several = [contender("exact", by_triangles(EXACT), SLACK)]
+    several += [contender(f"midpoint n={n}", by_triangles(n), math.inf) for n in splits]
+    several += [contender(f"tree rtol {rtol:.0e}", by_tree(rtol), rtol + SLACK) for rtol in tolerances]
+    return compete(case, several, rounds=rounds)
+
+
+def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
+    """Return what integrals are worth: wrong beyond the tolerance that the method states, or infinite where finite."""
+    finite = np.isfinite(truth) & (truth != 0.0)
+    error = np.abs(found[finite] - truth[finite]) / truth[finite]
+    wrong = int(np.sum(~(error <= tolerance))) + int(np.sum(found[~finite] != truth[~finite]))
+    if len(error) == 0:
+        return Check(0.0, wrong, tolerance)
+    return Check(float(error.max()), wrong, tolerance, float(error.mean()))
+
+
+def _plot(name: str, rows: Sequence[Row]) -> Plot:
+    return pareto_plot(name, rows, "worst relative error", {row.method: row.method.split()[0] for row in rows})
+
+
+def _add_growth(report: Report, *, most: int, rounds: int) -> None:
+    """Add the time of a plate against the number of triangles."""
+    rows: list[Row] = []
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for size in (100, 1_000, 10_000, 100_000, 1_000_000):
+        if size > most:
+            continue
+        triangles = torus(size)
+        poses = np.ascontiguousarray(
+            transforms.invert(around(triangles, 20, near=0.03, far=1.5, tilt=math.radians(60.0)))[:, None]
+        )
+        tree = triangle_tree(triangles)
+        clusters = make_clusters(triangles, tree)
+        areas = triangle_areas(triangles)
+        few = poses[:2]
+        contenders = [_timed(f"tree rtol {rtol:.0e}", clusters, tree, poses, rtol) for rtol in (1e-4, 1e-6)]
+        if size <= 100_000:
+            exact = Contender(
+                "exact",
+                lambda t=triangles, a=areas, p=few: sum_triangles(t, a, p, PLATE, False, False, EXACT)[0],
+                len(few),
+                _finite,
+            )
+            contenders.append(exact)
+        found = compete(f"torus, {len(triangles)} triangles", contenders, rounds=rounds)
+        rows += found
+        for row in found:
+            lines.setdefault(row.method, []).append((float(len(triangles)), row.median))
+    report.tables["a plate against the number of triangles"] = rows
+    report.plots.append(Plot("capacitive sensor", "triangles", "s per plate", lines, joined=True))
+    for name, points in lines.items():
+        report.notes.append(f"{name}: a plate costs like n^{exponent(points):.2f} in the number of triangles.")
+
+
+def _timed(name: str, clusters: object, tree: object, poses: Floats, rtol: float) -> Contender:
+    return Contender(
+        name,
+        lambda: sum_tree(clusters, tree, poses, PLATE, False, False, rtol)[0],  # type: ignore[arg-type]
+        len(poses),
+        _finite,
+    )
+
+
+def _finite(found: Floats) -> Check:
+    return Check(0.0, int(np.sum(~(found >= 0.0))))

@@ -1,0 +1,120 @@
+"""What answers the hard questions of `stability`: each by name, given plain values, returning plain values.
+
+A contestant runs in a process of its own, so that a crash or a hang is an outcome and not the end of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from replay.bench.engines import OURS_CHECKED, PEERS, Body, Engine
+
+Answer = Callable[[dict[str, Any]], list[float]]
+
+
+def contestants(subject: str) -> dict[str, tuple[str, Answer]]:
+    """Return package needed ("" for none) and function by name, for "pairs", "cones", "plates" or "boxes"."""
+    return {"pairs": _PAIRS, "cones": _CONES, "plates": _PLATES, "boxes": _BOXES}[subject]
+
+
+def _pair(engine: Engine) -> Answer:
+    def answer(question: dict[str, Any]) -> list[float]:
+        """Return [contact 0 or 1, distance]."""
+        a, b = Body(*question["a"]), Body(*question["b"])
+        queries = engine.queries(a, b, question["T_world_a"][None], question["T_world_b"][None])
+        return [float(queries.hits()[0]), float(queries.distances()[0])]
+
+    return answer
+
+
+def _exact_cone(question: dict[str, Any]) -> list[float]:
+    from replay.sensing.distance import closest_in_cone
+
+    hit = closest_in_cone(question["triangles"], question["apex"], question["axis"], question["aperture"])
+    return [hit.distance if hit.detected else math.inf]
+
+
+def _model_cone(method: str, **options: Any) -> Answer:
+    def answer(question: dict[str, Any]) -> list[float]:
+        from replay.bench.distance import read_once
+
+        return [read_once(method, question, **options)]
+
+    return answer
+
+
+def _plate(method: str, splits: int = 4) -> Answer:
+    def answer(question: dict[str, Any]) -> list[float]:
+        from replay.sensing.capacitive import plate_integral
+
+        triangles = np.array([question["triangle"]])
+        half, side = question["half_size"], question["side"]
+        return [float(plate_integral(triangles, half, side=side, method=method, splits=splits)[0])]
+
+    return answer
+
+
+def _plate_tree(question: dict[str, Any]) -> list[float]:
+    from replay.geometry.tree import triangle_tree
+    from replay.sensing.capacitive.clusters import make_clusters
+    from replay.sensing.capacitive.tree_sum import sum_tree
+
+    triangles = np.array([question["triangle"]])
+    tree = triangle_tree(triangles)
+    half, both = np.array([question["half_size"]]), question["side"] == "both"
+    here = np.identity(4)[None, None]
+    return [float(sum_tree(make_clusters(triangles, tree), tree, here, half, both, False, 1e-6)[0][0, 0])]
+
+
+def _obb(method: str) -> Answer:
+    def answer(question: dict[str, Any]) -> list[float]:
+        from replay.geometry.bounds import fit_obb
+
+        box = fit_obb(question["points"], method=method)  # type: ignore[arg-type]
+        return [*box.center, *box.half_widths, *box.axes.ravel()]
+
+    return answer
+
+
+def _eigenvectors(question: dict[str, Any]) -> list[float]:
+    """The textbook box: axes of the vertices' covariance as a general eigen-solver gives them."""
+    points = question["points"]
+    axes = np.real(np.linalg.eig(np.cov(points.T))[1]).T
+    along = points @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    return [*(0.5 * (low + high) @ axes), *(0.5 * (high - low)), *axes.ravel()]
+
+
+def _trimesh(question: dict[str, Any]) -> list[float]:
+    import trimesh
+
+    to_origin, extents = trimesh.bounds.oriented_bounds(question["points"])
+    back = np.linalg.inv(to_origin)
+    return [*back[:3, 3], *(0.5 * extents), *back[:3, :3].T.ravel()]
+
+
+_PAIRS = {
+    "replay": ("", _pair(OURS_CHECKED)),
+    **{engine.name: (engine.package, _pair(engine)) for engine in PEERS},
+}
+_CONES: dict[str, tuple[str, Answer]] = {
+    "replay": ("", _exact_cone),
+    "thesis": ("", _model_cone("thesis")),
+    "own, 1000 rays": ("", _model_cone("rays", engine="own")),
+    "embree, 1000 rays": ("embreex", _model_cone("rays", engine="embree")),
+}
+_PLATES: dict[str, tuple[str, Answer]] = {
+    "replay": ("", _plate("exact")),
+    "replay, tree rtol 1e-6": ("", _plate_tree),
+    "thesis, midpoint n=4": ("", _plate("midpoint")),
+}
+_BOXES: dict[str, tuple[str, Answer]] = {
+    "replay": ("", _obb("triangles")),
+    "replay, obb_vertices": ("", _obb("vertices")),
+    "covariance of vertices": ("", _eigenvectors),
+    "trimesh": ("trimesh", _trimesh),
+}

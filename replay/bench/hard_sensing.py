@@ -1,0 +1,150 @@
+"""Cones, plates and bodies on which formulas go wrong, family by family, with the right answer beside each."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.bench.cone_truth import nearest_in_cone
+from replay.bench.inputs import box, rotations, unit
+
+Floats = NDArray[np.float64]
+Cones = tuple[Floats, Floats, Floats]
+"""Triangles (n, 3, 3), axes (n, 3), apertures (n,); the apex is the origin."""
+
+
+def hard_cones(count: int, *, seed: int = 7) -> list[dict[str, Any]]:
+    """Return questions about one triangle in a cone: family, triangles, apex, axis, aperture, truth (inf: nothing)."""
+    questions = []
+    for number, (family, make) in enumerate(_CONES.items()):
+        triangles, axes, apertures = make(np.random.default_rng([seed, number]), count)
+        for triangle, axis, aperture in zip(triangles, axes, apertures, strict=True):
+            questions.append(
+                {
+                    "family": family,
+                    "triangles": triangle[None],
+                    "apex": np.zeros(3),
+                    "axis": axis,
+                    "aperture": float(aperture),
+                    "truth": nearest_in_cone(triangle[None], np.zeros(3), axis, float(aperture)),
+                    "size": float(np.abs(triangle).max()),
+                }
+            )
+    return questions
+
+
+def _generic(rng: np.random.Generator, n: int) -> Cones:
+    triangles = rng.normal(size=(n, 3, 3)) * np.exp(rng.uniform(-1.0, 1.5, size=(n, 1, 1)))
+    return triangles, unit(rng, n), 2.0 * rng.uniform(0.05, 1.1, size=n)
+
+
+def _normals(triangles: Floats) -> Floats:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals *= np.sign(np.sum(normals * triangles[:, 0], axis=1))[:, None]
+    return _towards(normals)
+
+
+def _towards(vectors: Floats) -> Floats:
+    return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+
+
+def _inner(rng: np.random.Generator, triangles: Floats) -> Floats:
+    weights = 0.05 + 0.85 * rng.dirichlet((1.0, 1.0, 1.0), len(triangles))
+    return np.sum(weights[:, :, None] * triangles, axis=1)
+
+
+def _plane_along_axis(rng: np.random.Generator, n: int) -> Cones:
+    triangles, axes, apertures = _generic(rng, n)
+    return triangles, _towards(np.cross(_normals(triangles), axes)), apertures
+
+
+def _meets_behind_apex(rng: np.random.Generator, n: int) -> Cones:
+    triangles, axes, apertures = _plane_along_axis(rng, n)
+    angle = 10.0 ** rng.uniform(-9.0, -0.5, size=(n, 1))
+    return triangles, _towards(np.cos(angle) * axes - np.sin(angle) * _normals(triangles)), apertures
+
+
+def _needle(rng: np.random.Generator, n: int) -> Cones:
+    triangles, _, _ = _generic(rng, n)
+    return triangles, _towards(_inner(rng, triangles)), 10.0 ** rng.uniform(-9.0, -1.5, size=n)
+
+
+def _nearly_half_space(rng: np.random.Generator, n: int) -> Cones:
+    triangles, axes, _ = _generic(rng, n)
+    return triangles, axes, math.pi - 10.0 ** rng.uniform(-9.0, -1.0, size=n)
+
+
+def _apex_near_surface(rng: np.random.Generator, n: int) -> Cones:
+    triangles, axes, apertures = _generic(rng, n)
+    normals = _normals(triangles)
+    triangles = triangles - _inner(rng, triangles)[:, None]
+    lift = 10.0 ** rng.uniform(-9.0, -3.0, size=n) * rng.choice([-1.0, 1.0], size=n)
+    return triangles + (lift[:, None] * normals)[:, None], axes, apertures
+
+
+def _far_and_small(rng: np.random.Generator, n: int) -> Cones:
+    triangles, _, apertures = _generic(rng, n)
+    size = 10.0 ** rng.uniform(-5.0, -1.0, size=n)
+    triangles *= (size / np.abs(triangles).max(axis=(1, 2)))[:, None, None]
+    axes = unit(rng, n)
+    aside = _towards(np.cross(axes, unit(rng, n)))
+    angle = (0.5 * apertures + 0.3 * rng.normal(size=n) * size)[:, None]
+    return triangles + (np.cos(angle) * axes + np.sin(angle) * aside)[:, None], axes, apertures
+
+
+def _scaled(rng: np.random.Generator, n: int) -> Cones:
+    triangles, axes, apertures = _generic(rng, n)
+    return triangles * 10.0 ** rng.uniform(-9.0, 6.0, size=(n, 1, 1)), axes, apertures
+
+
+_CONES: dict[str, Callable[[np.random.Generator, int], Cones]] = {
+    "any": _generic,
+    "plane along the axis": _plane_along_axis,
+    "axis meets plane behind apex": _meets_behind_apex,
+    "needles 1e-9..1e-2 rad": _needle,
+    "nearly a half space": _nearly_half_space,
+    "apex 1e-9..1e-3 off surface": _apex_near_surface,
+    "small, at the cone's border": _far_and_small,
+    "scale 1e-9..1e6": _scaled,
+}
+
+
+def hard_plates() -> list[dict[str, Any]]:
+    """Return questions about a triangle and a plate: family, triangle, half_size, side, truth.
+
+    The values were computed with 60 digits (clipping and closed forms in mpmath) and rounded to 17.
+    """
+    text = resources.files("replay.bench").joinpath("plate_integrals.json").read_text(encoding="utf-8")
+    cases: list[dict[str, Any]] = json.loads(text)["cases"]
+    return [{**case, "triangle": np.array(case["triangle"]), "truth": float(case["integral"])} for case in cases]
+
+
+def hard_boxes(count: int, *, seed: int = 9) -> list[dict[str, Any]]:
+    """Return point sets with repeated eigenvalues: family, points, and the volume of the tightest box known."""
+    octahedron = np.concatenate([np.identity(3), -np.identity(3)])
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+    turn = 2.0 * np.pi * np.arange(32) / 32
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    cylinder = np.concatenate([np.column_stack([circle, np.full(32, z)]) for z in (-0.5, 0.5)])
+    shapes = {
+        "cube": (box((1.0, 1.0, 1.0)), 1.0),
+        "nearly a cube": (box((1.0, 1.0 + 1e-9, 1.0 - 1e-9)), 1.0),
+        "square plate": (box((1.0, 1.0, 0.1)), 0.1),
+        "octahedron": (octahedron, math.sqrt(2.0) * math.sqrt(2.0) * 2.0),
+        "regular tetrahedron": (tetrahedron, 8.0),
+        "cylinder": (cylinder, 4.0),
+        "cube with a dense corner": (np.concatenate([box((1.0, 1.0, 1.0)), 0.5 - 1e-3 * unit(np.random.default_rng(1), 200) ** 2]), 1.0),
+    }
+    rng = np.random.default_rng(seed)
+    questions = []
+    for family, (points, volume) in shapes.items():
+        for T in rotations(rng, count):
+            order = rng.permutation(len(points))
+            questions.append({"family": family, "points": points[order] @ T[:3, :3].T + T[:3, 3], "volume": volume})
+    return questions

@@ -1,0 +1,81 @@
+"""Drawings of curves: what was measured and what the model says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from replay.logs.part_file import PartFile
+
+PANEL_INCHES = (5.2, 3.9)
+_COLORS = ("#1f5fa8", "#c4521a", "#3b7d3b", "#7a4a9c", "#8a6d1c", "#555555")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve of a panel: values at x, as points (measured) or as a line (computed); `color` counts the colours."""
+
+    label: str
+    x: ArrayLike
+    y: ArrayLike
+    points: bool = False
+    color: int = 0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing: title, what the axes show (with units), its curves, and whether both axes are logarithmic."""
+
+    title: str
+    x: str
+    y: str
+    lines: Sequence[Line]
+    logarithmic: bool = False
+
+
+def draw(path: Path, panels: Sequence[Panel], *, columns: int = 2, overwrite: bool = False) -> None:
+    """Write panels as one PNG.
+
+    Raises:
+        RecordingExistsError: the file exists and `overwrite` is false.
+        WriteError: the file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = min(columns, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(columns * PANEL_INCHES[0], rows * PANEL_INCHES[1]), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = np.ravel(figure.subplots(rows, columns, squeeze=False))
+    for panel, axis in zip(panels, axes, strict=False):
+        for line in panel.lines:
+            style = {"marker": "o", "linestyle": "none"} if line.points else {"linestyle": "-", "linewidth": 1.5}
+            axis.plot(line.x, line.y, label=line.label, color=_COLORS[line.color % len(_COLORS)], **style)
+        if panel.logarithmic:
+            axis.set_xscale("log")
+            axis.set_yscale("log")
+        axis.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
+        axis.grid(visible=True, alpha=0.3)
+        axis.legend(fontsize="small")
+    for axis in axes[len(panels) :]:
+        axis.set_visible(False)
+    picture = BytesIO()
+    figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
+    write_file(path, picture.getvalue(), overwrite=overwrite)
+
+
+def write_file(path: Path, data: bytes, *, overwrite: bool) -> None:
+    """Write a whole file, or leave what was there; raises as `draw`."""
+    file = PartFile(path, overwrite=overwrite)
+    try:
+        file.write(data)
+    except BaseException:
+        file.discard()
+        raise
+    file.commit()
