@@ -27,7 +27,7 @@ class RunProgress:
         self._costs: dict[str, float] = {}
         self._done = self._failed = 0
         self._cost_done = 0.0
-        self._begin = time.monotonic()
+        self._begin: float | None = None
 
     def __enter__(self) -> RunProgress:
         self._bars.start()
@@ -40,12 +40,12 @@ class RunProgress:
         """Begin to count."""
         interruption.check()
         self._costs = costs
-        self._begin = time.monotonic()
         self._bars.update(self._all, total=len(costs))
 
     def follow(self, name: str, done: int, total: int) -> None:
         """Show how far a running scenario is."""
         interruption.check()
+        self._begin = self._begin or time.monotonic()  # kernels are ready now
         if name not in self._running:
             self._running[name] = self._bars.add_task(f"  {escape(name)}", total=None)
         if total:
@@ -76,8 +76,8 @@ class RunProgress:
 
     def _left(self) -> str:
         """Return rate and time left, by the expected costs of what is done and what is not."""
-        seconds = time.monotonic() - self._begin
-        if not self._done or seconds <= 0.0 or self._done >= len(self._costs):
+        if self._begin is None or not self._done or self._done >= len(self._costs):
             return ""
+        seconds = max(time.monotonic() - self._begin, 1e-9)
         rest = max(sum(self._costs.values()) - self._cost_done, 0.0) / max(self._cost_done, 1e-9) * seconds
         return f", {60.0 * self._done / seconds:.0f} a minute, about {rest / 60.0:.0f} min left"

@@ -34,8 +34,6 @@ def regress(
     history: Path | None,
     patterns: tuple[str, ...],
     shard: Any,
-    missing: Any,
-    rrd: Any,
     **how: Any,
 ) -> ExitCode:
     """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
@@ -54,11 +52,10 @@ def regress(
     if not selection.chosen:
         return options.nothing(patterns)
     rules = rules or rules_beside(scenarios)
-    tolerances = read_rules(rules, today=datetime.date.today()) if rules else None
+    settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
+    settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
     with RunProgress() as watch:
-        names = {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
-        more = {"rules": tolerances, "missing": missing, "rrd": rrd, "watch": watch, **names, **settings}
-        found = judge(selection, output, baseline, **more)
+        found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
         write_reports(found, history=history)
     click.echo("\n".join([*describe(found), f"report: {output / 'index.html'}"]))
     return regression_code(found)

@@ -24,6 +24,7 @@ ROOT = Path(__file__).parents[2]
 def cluster(tmp_path):
     """Yield the scheduler's address and the pids of two workers."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "DASK_DISTRIBUTED__SCHEDULER__WORK_STEALING": "False"}
+    address = tmp_path / "scheduler.json"
     options = {"cwd": tmp_path, "env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
     def dask(name, *more):
