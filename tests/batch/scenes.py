@@ -49,8 +49,7 @@ def misbehave(order, progress):
         case "hang":
             time.sleep(3600)
         case "eat":
-            eaten = []
-            while True:
-                eaten.append(b"x" * (20 << 20))
-                time.sleep(0.01)
+            eaten = b"x" * (800 << 20)
+            time.sleep(3600)
+            del eaten
     return run_case(order, progress)

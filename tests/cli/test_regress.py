@@ -15,7 +15,7 @@ from replay.cli.main import run
 from tests.batch import scenes
 
 XSD = Path(__file__).parents[1] / "data" / "junit.xsd"
-LIMITS = ["--workers", "2", "--timeout", "4s", "--memory", "600MiB"]
+LIMITS = ["--workers", "2", "--timeout", "6s", "--memory", "600MiB"]
 
 
 def verdicts_of(folder):
@@ -158,7 +158,7 @@ def test_rules_beside_the_scenarios_are_the_default(tmp_path):
     scenes.write(tmp_path / "in", "a", distance=1.2000001)
     assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.DIFFERENT
     rules = tmp_path / "in" / "rules.yaml"
-    rules.write_text("rules_version: 1\nrules: [{signals: '*', abs: 1e-3, ignore: true, reason: rounding}]\n")
+    rules.write_text("rules_version: 1\nrules: [{signal: '*', abs: 1e-3, ignore: true, reason: rounding}]\n")
     assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.FINE
     assert json.loads((tmp_path / "out" / "run.json").read_text())["rules"] == str(rules)
 
