@@ -46,7 +46,8 @@ type: $(VENV)/.test  ## check types
 
 schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
-	cd replay/recording/schemas && ../../../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=replay.binpb *.proto
+	$(BIN)/python -m replay.comparison.rules_file
+	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
 
 pictures: setup system  ## render the README's pictures from the recordings that `make run` left
 	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3

@@ -7,6 +7,8 @@ numba, rerun, trimesh and scipy load only when something needs them.
 from __future__ import annotations
 
 import importlib
+import importlib.util
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -43,6 +45,17 @@ _ROOMS = (
 )
 
 __all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
+
+
+def submodules(package: str) -> Callable[[str], Any]:
+    """Return a package's `__getattr__` that imports its modules on first use: `replay.collision.gjk` just works."""
+
+    def resolve(name: str) -> Any:
+        if not name.startswith("_") and importlib.util.find_spec(f"{package}.{name}"):
+            return importlib.import_module(f"{package}.{name}")
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return resolve
 
 
 def __getattr__(name: str) -> Any:

@@ -72,3 +72,28 @@ def test_every_public_name_resolves():
         assert getattr(replay, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = replay.nothing
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = replay.geometry.nothing
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "geometry.bounds.fit_sphere",
+        "geometry.bounds.fit_aabb",
+        "geometry.bounds.fit_obb",
+        "collision.gjk.intersect",
+        "collision.gjk.distance",
+        "sensing.distance.closest_in_cone",
+        "sensing.capacitive.plate_integral",
+        "sensing.capacitive.output_voltage",
+    ],
+)
+def test_functions_of_the_contract_resolve_after_import_replay_alone(name):
+    done = subprocess.run(
+        [sys.executable, "-c", f"import replay; print(callable(replay.{name}))"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "True"

@@ -7,6 +7,7 @@ import datetime
 import json
 import platform
 import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +33,7 @@ class CaseResult:
         outcomes: what became of each expectation.
         recordings: where they are; None when the scenario failed before there were any.
         error: the one line that says why it failed; "" when it did not.
+        trace: where in the program it crashed, for log.txt; "" when its failure has a known cause.
         counters: what the collision pipeline did, by counter.
         seconds: wall time.
         notes: what a reader should know about the scene.
@@ -42,6 +44,7 @@ class CaseResult:
     outcomes: tuple[Outcome, ...] = ()
     recordings: RecordedPaths | None = None
     error: str = ""
+    trace: str = ""
     counters: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     notes: tuple[str, ...] = ()
@@ -140,6 +143,13 @@ def run_case(
         raise  # no later scenario could be written either
     except ReplayError as error:
         result = CaseResult(scenario.name, error=str(error), seconds=time.perf_counter() - begin)
+    except Exception as error:  # a crash is this scenario's result; the night goes on with the next
+        result = CaseResult(
+            scenario.name,
+            error=f"crashed: {type(error).__name__}: {error}",
+            trace=traceback.format_exc(),
+            seconds=time.perf_counter() - begin,
+        )
     else:
         result = CaseResult(
             scenario.name,
@@ -151,7 +161,7 @@ def run_case(
             notes=scene.notes,
         )
     _write(folder / "result.json", json.dumps(result.as_json(), indent=1) + "\n")
-    _write(folder / "log.txt", "".join(f"{line}\n" for line in describe(result)))
+    _write(folder / "log.txt", "".join(f"{line}\n" for line in describe(result)) + result.trace)
     return result
 
 
@@ -165,6 +175,12 @@ def describe(result: CaseResult) -> list[str]:
         lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
     lines.extend(f"  note: {note}" for note in result.notes)
     return lines
+
+
+def report(result: CaseResult) -> list[str]:
+    """Return a result as lines for people, and where its recordings are."""
+    made = result.recordings
+    return [*describe(result), *(f"  {path}" for path in ((made.mcap, made.rrd) if made else ()) if path)]
 
 
 def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:

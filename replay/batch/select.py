@@ -18,7 +18,8 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     """Return the scenario files that paths stand for, each once, in the order given.
 
     A file stands for itself. A folder stands for every `*.yaml` and `*.yml` file in it or below, sorted by path, that
-    has a `version` key at its top level: parts that are only included have none.
+    has a `version` key at its top level: parts that are only included have none. Hidden files and folders, such as an
+    environment's, are not looked at.
 
     Raises:
         InvalidValue: a path is not there, or a folder holds no scenario.
@@ -29,7 +30,8 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
             found[path] = None
         elif path.is_dir():
             files = sorted(file for pattern in ("*.yaml", "*.yml") for file in path.rglob(pattern) if file.is_file())
-            scenarios = [file for file in files if _VERSION_KEY.search(file.read_bytes())]
+            visible = [f for f in files if not any(part.startswith(".") for part in f.relative_to(path).parts)]
+            scenarios = [file for file in visible if _VERSION_KEY.search(file.read_bytes())]
             if not scenarios:
                 raise InvalidValue("SCENARIO", path, "holds no scenario: no *.yaml file with a top-level `version` key")
             found.update(dict.fromkeys(scenarios))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime
-import json
 from pathlib import Path
-from typing import Any
 
 import click
+
+from replay.cli.exit_codes import ExitCode
+from replay.cli.options import format_option, say
 
 FILE = click.Path(path_type=Path)
 
@@ -16,14 +17,25 @@ FILE = click.Path(path_type=Path)
 @click.argument("baseline", type=FILE)
 @click.argument("candidate", type=FILE)
 @click.option("--rules", type=FILE, help="Tolerances (YAML); without them everything must be equal.")
-@click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text", show_default=True)
+@format_option
 @click.option("-v", "--verbose", is_flag=True, help="List every signal, event and rule.")
 @click.option("--html", type=FILE, help="Write a page with drawings.")
 @click.option("--rrd", type=FILE, help="Write a rerun recording that shows both; a folder for run folders.")
 @click.option("--junit", type=FILE, help="Write a JUnit report.")
-@click.option("--suggest-rules", is_flag=True, help="Print the tightest rules that would pass, to be reviewed.")
+@click.option("--suggest-rules", "suggested", is_flag=True, help="Print the tightest rules that would pass.")
 @click.option("--strict-provenance", is_flag=True, help="Other versions, models and inputs count as a difference.")
-def diff(baseline: Path, candidate: Path, rules: Path | None, strict_provenance: bool, **wanted: Any) -> None:
+def diff(
+    baseline: Path,
+    candidate: Path,
+    rules: Path | None,
+    form: str,
+    verbose: bool,
+    html: Path | None,
+    rrd: Path | None,
+    junit: Path | None,
+    suggested: bool,
+    strict_provenance: bool,
+) -> ExitCode:
     """Compare CANDIDATE with BASELINE by meaning: two recordings (.mcap) or two run folders.
 
     Exit codes: 0 the same, 1 different, 2 invalid or unreadable input.
@@ -35,14 +47,12 @@ def diff(baseline: Path, candidate: Path, rules: Path | None, strict_provenance:
     from replay.comparison.runs import diff_runs
     from replay.comparison.suggest import suggest
 
-    outputs = Outputs(html=wanted["html"], junit=wanted["junit"], rrd=wanted["rrd"])
+    outputs = Outputs(html=html, junit=junit, rrd=rrd)
     tolerances = read_rules(rules, today=datetime.date.today()) if rules else None
     found = diff_runs(baseline, candidate, rules=tolerances, strict_provenance=strict_provenance, visit=outputs.visit)
     outputs.write(found)
-    if wanted["suggest_rules"]:
+    if suggested:
         click.echo(suggest(found), nl=False)
-    elif wanted["format_"] == "json":
-        click.echo(json.dumps(found.as_json(), indent=1, allow_nan=False))
     else:
-        click.echo(text(found, verbose=wanted["verbose"]), nl=False)
-    click.get_current_context().exit(1 if found.verdict is Verdict.DIFFERENT else 0)
+        say(form, lambda: text(found, verbose=verbose).rstrip("\n"), found.as_json)
+    return ExitCode.DIFFERENT if found.verdict is Verdict.DIFFERENT else ExitCode.FINE

@@ -25,11 +25,14 @@ if TYPE_CHECKING:
 @click.option("--topic", "topics", multiple=True, metavar="GLOB", help="Only topics that match; repeatable.")
 @click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 def export(recording: Path, form: Format, output: Path | None, topics: tuple[str, ...], overwrite: bool) -> ExitCode:
-    """Write topics of RECORDING (.mcap, or what a crash left as .mcap.part) as csv, json or parquet."""
+    """Write topics of RECORDING (.mcap, or the .mcap.part of a stopped run) as csv, json or parquet.
+
+    Of a cut or damaged file, what is whole is written (exit code 3).
+    """
     from replay.recording.export import export as write
     from replay.recording.reader import read
 
-    found = read(recording, salvage=recording.suffix == ".part")
+    found = read(recording, salvage=True)
     files = write(
         found,
         output or recording.parent,

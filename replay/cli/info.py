@@ -14,13 +14,13 @@ from replay.cli.options import format_option, note, say
 @click.argument("recording", type=click.Path(path_type=Path))
 @format_option
 def info(recording: Path, form: str) -> ExitCode:
-    """Say what RECORDING (.mcap, or what a crash left as .mcap.part) holds: topics, counts, provenance.
+    """Say what RECORDING (.mcap, or the .mcap.part of a stopped run) holds: topics, counts, provenance.
 
-    Every checksum of the file is verified on the way.
+    Every checksum of the file is verified on the way; of a cut or damaged file, what is whole is told (exit code 3).
     """
     from replay.recording.summary import summarize
 
-    found = summarize(recording, salvage=recording.suffix == ".part")
+    found = summarize(recording, salvage=True)
     say(form, found.as_text, found.as_json)
     if found.loss is None:
         return ExitCode.FINE

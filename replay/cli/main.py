@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Any
 
 import click
 
 import replay
+from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode
 from replay.errors import ReplayError
 
@@ -20,6 +22,7 @@ COMMANDS = {
     "calibrate": "fit a capacitive sensor to a measured curve",
     "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
+    "diff": "say what differs between two recordings or two run folders",
     "view": "show recordings in the rerun viewer, or make a picture",
 }
 """Help by name of command; each is the function of that name in the module of that name."""
@@ -52,8 +55,14 @@ def replay_command() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and leave with its exit code."""
-    sys.exit(int(run(arguments)))
+    """Run the command line and leave with its exit code.
+
+    Asked to stop by the system (SIGTERM, or SIGHUP of a closed terminal), a command ends as by Ctrl-C: it removes half
+    files and takes the viewer with it.
+    """
+    interruption.install()
+    code = run(arguments)
+    sys.exit(int(ExitCode.INTERRUPTED if interruption.requested() else code))
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
@@ -75,4 +84,8 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except BrokenPipeError:
         sys.stderr.close()  # nobody reads on; Python would complain about it at exit
         return ExitCode.FINE
+    except Exception as error:  # Python's own exit code for it is 1, which here means "different"
+        traceback.print_exc()
+        click.echo(f"replay: error: this is a fault of replay: {type(error).__name__}: {error}", err=True)
+        return ExitCode.FAILED
     return result if isinstance(result, ExitCode) else ExitCode.FINE

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from replay.cli import interruption
+
 Follow = Callable[[int, int], None]
 
 
@@ -22,7 +24,8 @@ class RunProgress:
             TimeElapsedColumn(),
             TimeRemainingColumn(),
         )
-        self._bars = Progress(*columns, console=Console(stderr=True), transient=True)
+        console = Console(stderr=True)
+        self._bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
     def __enter__(self) -> RunProgress:
         self._bars.start()
@@ -33,9 +36,11 @@ class RunProgress:
 
     def follow(self, name: str, frames: int) -> Follow:
         """Return what advances a new bar; called with frames computed and all frames."""
+        interruption.check()
         bar = self._bars.add_task(name, total=frames)
 
         def advance(done: int, total: int) -> None:
+            interruption.check()
             self._bars.update(bar, completed=done, total=total, visible=done < total)
 
         return advance

@@ -33,7 +33,7 @@ def run(
 
     Each goes to OUTPUT/NAME/NAME.mcap and .rrd; an expectation that does not hold is exit code 4.
     """
-    from replay.batch.run import CaseResult, describe, run_all
+    from replay.batch.run import report, run_all
     from replay.batch.select import load_all, select
     from replay.cli.progress import RunProgress
     from replay.numerics.jit import is_cache_empty
@@ -55,12 +55,6 @@ def run(
             overwrite=overwrite,
             progress=lambda scenario: progress.follow(scenario.name, scenario.frames),
         )
-
-    def text(result: CaseResult) -> str:
-        paths = (
-            [str(path) for path in (result.recordings.mcap, result.recordings.rrd) if path] if result.recordings else []
-        )
-        return "\n".join([*describe(result), *(f"  {path}" for path in paths)])
-
-    say(form, lambda: "\n".join(map(text, results)), lambda: [result.as_json() for result in results])
+    lines = [line for result in results for line in report(result)]
+    say(form, lambda: "\n".join(lines), lambda: [result.as_json() for result in results])
     return ExitCode.FINE if all(result.status == "passed" for result in results) else ExitCode.FAILED

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from replay.collision.bodies import AABB, SPHERE, Volumes
 from replay.collision.leaf import leaf
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
-from replay.numerics.jit import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -101,7 +100,7 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
     return aabbs_meet(center_a, half_a, center_b, half_b, scratch[:4])
 
 
-@kernel
+@leaf
 def sieve(
     volumes: Volumes,
     pairs: Integers,
@@ -111,6 +110,8 @@ def sieve(
     level: Bytes,
     task: Bytes,
     counts: Integers,
+    spreads: Floats,
+    scratch: Floats,
 ) -> None:
     """Fill level (n, P) with 0 clear or 1 bounds, and task (n, P) with SKIP, RUN or REPEAT.
 
@@ -122,10 +123,9 @@ def sieve(
         limit: pairs farther apart than this are of no interest [m].
         level, task: out.
         counts: (COUNTS,) added to.
+        spreads, scratch: (Q, 2), (8, 4) scratch.
     """
     n = level.shape[0]
-    scratch = np.zeros((8, 4))
-    spreads = np.empty((len(poses), 2))
     for q in range(len(poses)):
         spreads[q, 0], spreads[q, 1] = spread(poses[q])
     for p in range(len(pairs)):

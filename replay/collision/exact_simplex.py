@@ -7,7 +7,8 @@ When a support point w was just added because it is lower along v than v itself,
 corner; asking for that settles ties that even double-doubles cannot see (a direction that is off by x makes the
 distance wrong by x^2 only).
 
-With edge e = q - p: weights (q.e, -p.e) over e.e. Faces and interior as in `simplex`.
+With edge e = q - p: weights (q.e, -p.e) over e.e, and the foot is e x (p x e)/(e.e), with p the nearer end: orthogonal
+to e to its own last digit, which p + t e is only to the last digit of p. Faces and interior as in `simplex`.
 """
 
 from __future__ import annotations
@@ -69,11 +70,8 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             of_p, of_q = dd.dot(q, e), dd.negative(dd.dot(p, e))
             if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(total)):
                 continue
-            # from the nearer end, so that the sum does not cancel more than it must
-            t = dd.divide(of_q, total)
-            foot = _sum(p, dd.scale(t, e))
-            if of_q[0] > of_p[0]:
-                foot = dd.difference(q, dd.scale(dd.divide(of_p, total), e))
+            turned = dd.cross(e, dd.cross(p if of_p[0] >= of_q[0] else q, e))
+            foot = (dd.divide(turned[0], total), dd.divide(turned[1], total), dd.divide(turned[2], total))
             square = dd.dot(foot, foot)
             if dd.is_less(square, best):
                 best = square
@@ -121,8 +119,3 @@ def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     limit = 2.0**-96 * size * size * size
     weights[0], weights[1], weights[2], weights[3] = a[0] / volume, b[0] / volume, c[0] / volume, d[0] / volume
     return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit
-
-
-@leaf
-def _sum(u: dd.Vector, v: dd.Vector) -> dd.Vector:
-    return dd.add(u[0], v[0]), dd.add(u[1], v[1]), dd.add(u[2], v[2])

@@ -108,8 +108,8 @@ def distance(
     Args and Raises: as `intersect`.
 
     Accuracy:
-        For the vertices rounded to doubles about a common origin: relative 1e-12, plus 2^-90 of the scene's size
-        (bodies and their offset), proven by `lower_bound`. That rounding is below 1e-15 of the scene's size
+        For the vertices rounded to doubles about a common origin: relative 1e-12, plus 2^-70 of the scene's size
+        (bodies and their offset), proven by `lower_bound`. That rounding is below 3e-15 of the scene's size
         (tests/collision/test_hard_cases.py). Swapping a and b gives the same bits.
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.

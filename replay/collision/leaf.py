@@ -13,5 +13,7 @@ from replay.numerics.jit import Function, kernel
 def leaf(function: Function) -> Function:
     """Compile as `kernel` does, without reference counting; a function that would allocate fails to compile."""
     dispatcher = kernel(function)
-    dispatcher.targetoptions["_nrt"] = False  # type: ignore[attr-defined]
+    getattr(dispatcher, "targetoptions", {})["_nrt"] = (
+        False  # absent when NUMBA_DISABLE_JIT leaves the function as it is
+    )
     return dispatcher

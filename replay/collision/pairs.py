@@ -84,24 +84,29 @@ def plan(bodies: Sequence[CollisionBody], linkage: Linkage, *, disabled: Sequenc
     names = [body.name for body in bodies]
     if len(set(names)) != len(names):
         raise InvalidValue("bodies", sorted(names), "body names must be unique")
+    rules = [(_matching(rule.a, bodies, linkage), _matching(rule.b, bodies, linkage)) for rule in disabled]
     reached: set[int] = set()
+    static: dict[tuple[int, int], bool | None] = {}  # None: adjacent
     pairs = []
     for a, b in itertools.combinations(sorted(range(len(bodies)), key=names.__getitem__), 2):
-        link_a, link_b = bodies[a].link, bodies[b].link
-        if link_a == link_b:
+        links = (bodies[a].link, bodies[b].link)
+        if links[0] == links[1]:
             continue
-        matching = [k for k, rule in enumerate(disabled) if _matches(rule, bodies[a], bodies[b], linkage)]
+        matching = [k for k, (x, y) in enumerate(rules) if (a in x and b in y) or (b in x and a in y)]
         reached.update(matching)
-        if matching or linkage.are_adjacent(link_a, link_b):
-            continue
-        static = not linkage.moves_between(link_a, link_b)
-        pairs.append(Pair(f"{names[a]}|{names[b]}", a, b, static))
+        if links not in static:
+            static[links] = None if linkage.are_adjacent(*links) else not linkage.moves_between(*links)
+        fixed = static[links]
+        if not matching and fixed is not None:
+            pairs.append(Pair(f"{names[a]}|{names[b]}", a, b, fixed))
     unmatched = tuple(rule for k, rule in enumerate(disabled) if k not in reached)
     return PairPlan(tuple(sorted(pairs, key=lambda pair: pair.name)), unmatched)
 
 
-def _matches(rule: DisabledPair, a: CollisionBody, b: CollisionBody, linkage: Linkage) -> bool:
-    def fits(pattern: str, body: CollisionBody) -> bool:
-        return fnmatchcase(body.name, pattern) or fnmatchcase(linkage.link_names[body.link], pattern)
-
-    return (fits(rule.a, a) and fits(rule.b, b)) or (fits(rule.a, b) and fits(rule.b, a))
+def _matching(pattern: str, bodies: Sequence[CollisionBody], linkage: Linkage) -> set[int]:
+    """Return the bodies whose name or whose link's name fits the glob."""
+    return {
+        k
+        for k, body in enumerate(bodies)
+        if fnmatchcase(body.name, pattern) or fnmatchcase(linkage.link_names[body.link], pattern)
+    }

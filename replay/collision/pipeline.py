@@ -183,7 +183,8 @@ class CollisionPipeline:
         task = np.zeros((n, count), dtype=np.uint8)
         sieved = np.zeros(broad.COUNTS, dtype=np.int64)
         decided = np.zeros(narrow.COUNTS, dtype=np.int64)
-        broad.sieve(self._volumes, rows, relative, turns, self._limit, part.level, task, sieved)
+        spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
+        broad.sieve(self._volumes, rows, relative, turns, self._limit, part.level, task, sieved, spreads, scratch)
         self._decide(rows, relative, self._limit, task, part.level, part.clearance, part.undecided, decided)
         part.evaluated[:] = ~np.isnan(part.clearance)
         for name in ("level", "clearance", "evaluated", "undecided"):

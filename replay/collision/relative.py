@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from replay.collision.leaf import leaf
 from replay.kinematics.linkage import Linkage
-from replay.numerics.jit import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,7 +33,10 @@ class RelativePoses:
 
     def of(self, local: Floats) -> Floats:
         """Return T_a_b (Q, n, 4, 4) of the Q link pairs, for link poses local (n, L, 4, 4) in their parents."""
-        return _relative(np.ascontiguousarray(local), self._ways, self._pairs)
+        n = len(local)
+        table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(self._pairs), n, 4, 4))
+        _relative(np.ascontiguousarray(local), self._ways, self._pairs, table, np.identity(4), np.identity(4), result)
+        return result
 
     def _row(self, down: tuple[int, ...], ways: list[tuple[int, int]], rows: dict[tuple[int, ...], int]) -> int:
         """Return the row of the way down these links, -1 for none, adding what is missing."""
@@ -47,20 +49,16 @@ class RelativePoses:
         return rows[down]
 
 
-@kernel
-def _relative(local: Floats, ways: Integers, pairs: Integers) -> Floats:
+@leaf
+def _relative(
+    local: Floats, ways: Integers, pairs: Integers, table: Floats, identity: Floats, inverse: Floats, result: Floats
+) -> None:
+    """Fill result (Q, n, 4, 4); `table` (ways, n, 4, 4) and `inverse` (4, 4), an identity at first, are scratch."""
     n = local.shape[0]
-    table = np.empty((len(ways), n, 4, 4))
     for k in range(len(ways)):
         parent, link = ways[k, 0], ways[k, 1]
         for f in range(n):
-            if parent < 0:
-                table[k, f] = local[f, link]
-            else:
-                _compose(table[parent, f], local[f, link], table[k, f])
-    result = np.empty((len(pairs), n, 4, 4))
-    inverse, identity = np.zeros((4, 4)), np.identity(4)
-    inverse[3, 3] = 1.0
+            _compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
     for q in range(len(pairs)):
         a, b = pairs[q, 0], pairs[q, 1]
         for f in range(n):
@@ -70,7 +68,6 @@ def _relative(local: Floats, ways: Integers, pairs: Integers) -> Floats:
                     inverse[i, j] = up[j, i]
                 inverse[i, 3] = -(up[0, i] * up[0, 3] + up[1, i] * up[1, 3] + up[2, i] * up[2, 3])
             _compose(inverse, identity if b < 0 else table[b, f], result[q, f])
-    return result
 
 
 @leaf

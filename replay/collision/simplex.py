@@ -8,6 +8,9 @@ barycentric coordinates n.(b x c), n.(c x a), n.(a x b), over n.n. The Voronoi r
 C. Ericson, Real-Time Collision Detection, 5.1.5. In the face region the nearest point is n (n.a)/(n.n): its direction
 is as good as the normal's, however near the origin is, where a weighted sum of corners would cancel.
 
+Segment with ends a, b and e = b - a: the foot of the perpendicular is e x (a x e)/(e.e), orthogonal to e to its own
+last digit, which a + t e is only to the last digit of a.
+
 Tetrahedron p0..p3: with D_ijk = p_i.(p_j x p_k), the barycentric coordinates of the origin are D_123, -D_023, D_013,
 -D_012 over their sum, the (six-fold) volume. The origin is inside iff all four have the sign of the sum.
 """
@@ -60,10 +63,8 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
     if along >= square:
         return b, 0.0, 1.0
     t = along / square
-    if t <= 0.5:
-        return (a[0] + t * e[0], a[1] + t * e[1], a[2] + t * e[2]), 1.0 - t, t
-    s = 1.0 - t
-    return (b[0] - s * e[0], b[1] - s * e[1], b[2] - s * e[2]), s, t
+    v = cross(e, cross(a if t <= 0.5 else b, e))
+    return (v[0] / square, v[1] / square, v[2] / square), 1.0 - t, t
 
 
 @leaf

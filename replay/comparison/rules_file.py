@@ -1,4 +1,4 @@
-"""Rules as a YAML file: `version: 1` and `rules`, each with its pattern, tolerances and reason.
+"""Rules as a YAML file: `rules_version: 1` and `rules`, each with its pattern, tolerances and reason.
 
 `python -m replay.comparison.rules_file` writes the JSON Schema of the language, for editors.
 """
@@ -121,8 +121,8 @@ class RuleText(Part):
 class RulesText(Part):
     """Tolerances for comparing two recordings; without a matching rule a signal must be equal."""
 
-    version: Literal[1]
-    """Version of this language."""
+    rules_version: Literal[1]
+    """Version of this language; the key is not `version`, which marks scenarios in a folder."""
     rules: tuple[RuleText, ...]
     """Rules; the first that matches a signal counts."""
 
@@ -155,7 +155,7 @@ def read_rules(path: str | Path, *, today: datetime.date | None = None) -> Rules
 
 def _validated(root: Node) -> list[Rule]:
     if not isinstance(root.value, dict):
-        raise ScenarioError([root.place.problem("a rules file is a mapping with version and rules")])
+        raise ScenarioError([root.place.problem("a rules file is a mapping with rules_version and rules")])
     try:
         text = RulesText.model_validate(root.data())
     except ValidationError as error:

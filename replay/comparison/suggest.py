@@ -94,7 +94,7 @@ def _head(found: RunDifference) -> Iterator[str]:
     yield f"# {json.dumps(found.candidate)} passes against {json.dumps(found.baseline)}."
     yield "# Review each: is the difference meant? Then say why in the rule's reason, and move the rule to the top of"
     yield "# your rules. If not, leave it out: it would hide a fault."
-    yield "version: 1"
+    yield "rules_version: 1"
 
 
 def _rules(rules: dict[tuple[str, ...], list[str]]) -> Iterator[str]:

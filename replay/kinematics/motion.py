@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MotionLimitError
 from replay.kinematics.linkage import Joint, Linkage
-from replay.kinematics.profiles import Profile, Waypoint, from_pieces, through_waypoints, trapezoid, trapezoid_time
+from replay.kinematics.profiles import (
+    Profile,
+    Waypoint,
+    from_pieces,
+    through_samples,
+    through_waypoints,
+    trapezoid,
+    trapezoid_time,
+)
 from replay.numerics import transforms
 
 Array = NDArray[np.float64]
@@ -45,6 +53,14 @@ class Keyframe:
     quat_xyzw: tuple[float, float, float, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Recorded positions of a joint: times (n,) [s], strictly increasing, and positions (n,) [rad or m]; n >= 1."""
+
+    seconds: Array
+    positions: Array
+
+
 @dataclass(frozen=True)
 class Script:
     """All scripted motion of a scenario; a joint that no entry names holds its initial position."""
@@ -52,6 +68,7 @@ class Script:
     points: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
     moves: tuple[Move, ...] = ()
     free: Mapping[str, tuple[Keyframe, ...]] = field(default_factory=dict)
+    recorded: Mapping[str, Track] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +120,7 @@ def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
     """Return the profile of every scalar joint by name; see `sample` for what is raised."""
     joints = {joint.name: joint for joint in linkage.joints}
     moved = {name for move in script.moves for name in move.to}
-    for kind, names in (("points", set(script.points)), ("moves", moved)):
+    for kind, names in (("points", set(script.points)), ("moves", moved), ("recorded", set(script.recorded))):
         for name in sorted(names - joints.keys()):
             raise InvalidValue(f"motion.{kind}", repr(name), f"names no such joint; joints are {sorted(joints)}")
     for name in sorted(set(script.free) - set(linkage.free_names)):
@@ -112,8 +129,11 @@ def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
         )
     for name in sorted(moved & set(script.points)):
         raise InvalidValue("motion.moves", repr(name), "is moved by motion.points as well; keep one of the two")
+    for name in sorted(set(script.recorded) & (moved | set(script.points))):
+        raise InvalidValue("motion.recorded", repr(name), "is moved by motion.points or moves as well; keep one")
     profiles = {name: from_pieces([], joint.initial, joint.initial) for name, joint in joints.items()}
     profiles |= {name: through_waypoints(name, points) for name, points in script.points.items()}
+    profiles |= {name: through_samples(track.seconds, track.positions) for name, track in script.recorded.items()}
     return profiles | _planned(joints, script.moves)
 
 

@@ -80,13 +80,20 @@ class Profile:
         if not len(self.start):
             return [(0.0, self.after if derivative == 0 else 0.0)]
         found = [(float(self.start[0]), self.before), (float(self.end[-1]), self.after)] if derivative == 0 else []
-        for start, end, coefficients in zip(self.start, self.end, self.coefficients, strict=True):
-            polynomial = np.polynomial.Polynomial(coefficients).deriv(derivative)
-            length = float(end - start)
+        c = self.coefficients
+        for _ in range(derivative):
+            c = c[:, 1:] * np.arange(1.0, c.shape[1])
+        length = self.end - self.start
+        at_end = np.zeros(len(c))
+        for power in range(c.shape[1] - 1, -1, -1):
+            at_end = at_end * length + c[:, power]
+        for times, values in ((self.start, c[:, 0]), (self.end, at_end)):
+            found.extend((float(times[k]), float(values[k])) for k in (values.argmin(), values.argmax()))
+        for k in np.flatnonzero((c[:, 2:] != 0.0).any(axis=1)):  # a line has its extremes at its ends
+            polynomial = np.polynomial.Polynomial(c[k])
             roots = map(complex, polynomial.deriv().trim().roots())
             inner = [root.real for root in roots if abs(root.imag) <= 1e-9 * (1.0 + abs(root.real))]
-            times = [0.0, length, *(t for t in inner if 0.0 < t < length)]
-            found.extend((float(start) + tau, float(polynomial(tau))) for tau in times)
+            found.extend((float(self.start[k]) + t, float(polynomial(t))) for t in inner if 0.0 < t < length[k])
         return found
 
 
@@ -115,6 +122,19 @@ def through_waypoints(name: str, waypoints: Sequence[Waypoint]) -> Profile:
         before=waypoints[0].position,
         after=waypoints[-1].position,
     )
+
+
+def through_samples(seconds: Array, positions: Array) -> Profile:
+    """Return the profile that joins samples by straight lines.
+
+    Args:
+        seconds: (n,) strictly increasing times [s], n >= 1.
+        positions: (n,) [rad or m].
+    """
+    coefficients = np.zeros((len(seconds) - 1, 6))
+    coefficients[:, 0] = positions[:-1]
+    coefficients[:, 1] = np.diff(positions) / np.diff(seconds)
+    return Profile(seconds[:-1], seconds[1:], coefficients, before=float(positions[0]), after=float(positions[-1]))
 
 
 def _hermite(a: Waypoint, b: Waypoint) -> list[float]:

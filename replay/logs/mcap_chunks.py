@@ -13,10 +13,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from replay.errors import RecordingError
-from replay.logs.mcap_records import MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
-
-MAX_CHUNK = 1 << 28
-"""Largest chunk [bytes, unpacked] that is read; a larger size is damage or an attack."""
+from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
 
 _MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
 

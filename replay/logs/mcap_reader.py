@@ -7,11 +7,13 @@ is unpacked, so that damage anywhere is an error and never a different number.
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from replay.errors import RecordingError
 from replay.logs.mcap_chunks import Run, read_message, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
+    MAX_RECORD,
     MESSAGE_HEAD,
     PREAMBLE,
     RECORD_HEAD,
@@ -33,9 +36,6 @@ from replay.logs.mcap_records import (
     read_chunk,
     read_schema,
 )
-
-MAX_RECORD = 1 << 30
-"""Largest record [bytes] that is read; a larger length is damage or an attack."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,10 @@ class McapLog:
         loss: what was lost when the file was salvaged, else None.
     """
 
-    def __init__(self, path: str | Path, *, salvage: bool = False) -> None:
+    def __init__(self, path: str | Path, *, salvage: bool = False, data: bytes | None = None) -> None:
         """Walk and verify a file; with `salvage`, keep everything before the first damage instead of refusing it.
+
+        Given its bytes as `data`, the file itself is not touched; `path` is its name in messages then.
 
         Raises:
             RecordingError: the file cannot be read, is not an MCAP file, or is damaged or cut (without `salvage`).
@@ -86,8 +88,8 @@ class McapLog:
         self._file = str(path)
         self._salvage = salvage
         try:
-            self._size = self.path.stat().st_size
-            self._stream = self.path.open("rb")
+            self._size = self.path.stat().st_size if data is None else len(data)
+            self._stream: BinaryIO = self.path.open("rb") if data is None else io.BytesIO(data)
         except OSError as error:
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
         try:

@@ -12,6 +12,10 @@ RECORD_HEAD = 9
 """Bytes before a record's content: opcode (1) and content length (8)."""
 MESSAGE_HEAD = 22
 """Bytes of a message record's content before its data: channel (2), sequence (4), log time (8), publish time (8)."""
+MAX_RECORD = 1 << 30
+"""Largest record [bytes] that is read or written; a larger length is damage or an attack."""
+MAX_CHUNK = 1 << 28
+"""Largest chunk [bytes, unpacked] that is read or written."""
 PREAMBLE = "preamble"
 """Name of our metadata record that closes the part before the first chunk: `crc32` of all bytes before it.
 

@@ -18,9 +18,11 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from replay.logs.mcap_records import MAGIC, MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Op, Schema
+from replay.errors import InvalidValue
+from replay.logs.mcap_records import MAGIC, MAX_CHUNK, MAX_RECORD, MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Op, Schema
 
 _ZSTD_LEVEL = 3
+_CHUNK_BYTES = 1 << 26  # beyond, a block of one topic is cut into several chunks: readers hold a chunk in memory
 
 
 class Sink(Protocol):
@@ -78,7 +80,9 @@ class McapFileWriter:
         self._metadata_indexes.append(mcap.records.MetadataIndex(offset=offset, length=length, name=name))
 
     def attachment(self, name: str, media_type: str, data: bytes) -> None:
-        """Add a file."""
+        """Add a file; InvalidValue when it is too large for a record that readers accept."""
+        if len(data) > MAX_RECORD - 4096:
+            raise InvalidValue(f"size of {name}", len(data), f"a file in a recording has at most {MAX_RECORD} bytes")
         offset = self._size
         record = mcap.records.Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
         length = self._put_record(record)
@@ -117,10 +121,13 @@ class McapFileWriter:
         self.metadata(PREAMBLE, {"crc32": str(self._crc)})
 
     def rows(self, rows: MessageRows) -> None:
-        """Write a block of messages of equal length as one chunk."""
+        """Write a block of messages of equal length as one chunk, or as several when it is very large."""
         n, stride = rows.records.shape
-        offsets = np.arange(0, n * stride, stride, dtype=np.uint64)
-        self._chunk(rows.channel, rows.time, offsets, rows.records.tobytes())
+        step = max(1, _CHUNK_BYTES // stride)
+        for begin in range(0, n, step):
+            part = rows.records[begin : begin + step]
+            offsets = np.arange(0, part.size, stride, dtype=np.uint64)
+            self._chunk(rows.channel, rows.time[begin : begin + step], offsets, part.tobytes())
 
     def messages(self, channel: int, time: Sequence[int], sequence: Sequence[int], data: Sequence[bytes]) -> None:
         """Write messages of any length as one chunk; nothing when there are none."""
@@ -182,6 +189,10 @@ class McapFileWriter:
         )
 
     def _chunk(self, channel: int, time: NDArray[np.int64], offsets: NDArray[np.uint64], data: bytes) -> None:
+        if len(data) > MAX_CHUNK:
+            raise InvalidValue(
+                "size of a message", len(data), f"a message in a recording has at most {MAX_CHUNK} bytes"
+            )
         start, end = int(time.min()), int(time.max())
         compressed = self._compressor.compress(data)
         at = self._size

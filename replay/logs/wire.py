@@ -44,7 +44,7 @@ _VARINT = {
 }
 _ZIGZAG = (FieldDescriptor.TYPE_SINT32, FieldDescriptor.TYPE_SINT64)
 _MAX_DEPTH = 32
-_MAX_SLOTS = 20_000  # beyond, a message is a picture or a mesh and not a row of readings
+_MAX_SLOTS = 1_000_000  # beyond, a message is a mesh and not a row of readings
 _WIRE_VARINT, _WIRE_64, _WIRE_LENGTH, _WIRE_32 = 0, 1, 2, 5
 
 

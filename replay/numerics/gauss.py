@@ -112,12 +112,13 @@ WEIGHTS_16 = np.array(
 
 
 def _symmetric_rule(centre: float, *orbits: tuple[float, ...]) -> NDArray[np.float64]:
-    """Return (k, 4) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
-    rows = [(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, centre)]
+    """Return (4, k) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
+    rows: list[tuple[float, ...]] = [(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, centre)]
     for weight, *place in orbits:
-        point = (1.0 - 2.0 * place[0], place[0], place[0]) if len(place) == 1 else (*place, 1.0 - place[0] - place[1])
-        rows += [(*corners, weight) for corners in sorted(set(permutations(point)))]
-    return np.array(rows)
+        corners = (*place, *place) if len(place) == 1 else tuple(place)
+        point = (*corners, 1.0 - corners[0] - corners[1])
+        rows += [(*permuted, weight) for permuted in sorted(set(permutations(point)))]
+    return np.ascontiguousarray(np.array(rows).T)
 
 
 TRIANGLE_7 = _symmetric_rule(

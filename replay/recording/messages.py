@@ -36,7 +36,7 @@ def schema(name: str) -> Schema:
 
 @functools.cache
 def _own_types() -> Any:
-    compiled = resources.files("replay.recording").joinpath("schemas", "replay.binpb").read_bytes()
+    compiled = resources.files("replay.recording").joinpath("replay.binpb").read_bytes()
     pool = descriptor_pool.DescriptorPool()
     for file in descriptor_pb2.FileDescriptorSet.FromString(compiled).file:
         pool.AddSerializedFile(file.SerializeToString())

@@ -28,7 +28,7 @@ RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
 
-_SOURCES = (".py", ".proto", ".binpb", ".yaml")
+_SOURCES = (".py", ".binpb")
 
 
 @dataclass(frozen=True)

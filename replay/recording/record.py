@@ -84,21 +84,22 @@ def record_blocks(
         mcap=Path(directory) / f"{scenario.name}.mcap",
         rrd=Path(directory) / f"{scenario.name}.rrd" if rrd else None,
     )
-    mcap = McapWriter(paths.mcap, provenance, shown, scenario.sources, overwrite=overwrite)
-    writers: list[Writer] = [mcap]
-    if paths.rrd is not None:
+    if rrd:  # before any file is made: loading rerun takes a second, in which a run may be interrupted
         from replay.recording.rerun_log import RerunWriter
-
-        try:
+    writers: list[Writer] = []  # the log of record is the last to be closed: where it is, all is
+    try:
+        writers.append(McapWriter(paths.mcap, provenance, shown, scenario.sources, overwrite=overwrite))
+        if paths.rrd is not None:
             writers.insert(0, RerunWriter(paths.rrd, scene.layout, shown, overwrite=overwrite))
-        except BaseException:
-            mcap.discard()
-            raise
-    with WriteBehind(writers) as behind:  # the log of record is closed last: where it is, all is
-        done = 0
-        for block in blocks:
-            behind.put(block)
-            done += len(block.time)
-            if progress is not None:
-                progress(done, scene.frames)
+        with WriteBehind(writers) as behind:
+            done = 0
+            for block in blocks:
+                behind.put(block)
+                done += len(block.time)
+                if progress is not None:
+                    progress(done, scene.frames)
+    except BaseException:  # an interruption may come before WriteBehind looks after its writers
+        for writer in writers:
+            writer.discard()
+        raise
     return paths

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -43,7 +42,7 @@ def show(files: Sequence[Path], *, web: bool = False) -> None:
     command = [str(viewer_binary()), *map(str, files)]
     if web:
         command += ["--web-viewer", "--bind", "127.0.0.1"]
-    process = subprocess.Popen(command, env={**os.environ, "RERUN_ANALYTICS": "0"})
+    process = subprocess.Popen(command)
     try:
         code = process.wait()
     finally:

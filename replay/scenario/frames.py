@@ -38,6 +38,8 @@ def time_ns(rate: Fraction, begin: int, end: int) -> NDArray[np.int64]:
 
 
 def seconds(rate: Fraction, begin: int, end: int) -> NDArray[np.float64]:
-    """Return the times (end - begin,) [s] of frames begin..end-1: the doubles nearest to k / rate."""
-    n, d = rate.numerator, rate.denominator
-    return np.array([k * d / n for k in range(begin, end)], dtype=np.float64)
+    """Return the times (end - begin,) [s] of frames begin..end-1: the doubles nearest to their nanoseconds.
+
+    A frame is computed at the time that is recorded, so that a recording plays back to the same bits.
+    """
+    return time_ns(rate, begin, end) / 1e9

@@ -16,7 +16,7 @@ from replay.scenario.names import Names
 from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
-from replay.scenario.source import Attached, Folder, Library, Provenance, SourceRule, problem_at, resolve_name
+from replay.scenario.source import Attached, Folder, Library, Provenance, SourceRule, find, problem_at, resolve_name
 from replay.scenario.yaml_text import parse
 
 VERSION = 1
@@ -94,9 +94,13 @@ def _load(library: Library) -> Scenario:
     problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
     provenance = Provenance(main=library.main, sources=text.sources, root=root)
     problems.extend(_read_meshes(library, text, root, provenance))
-    if problems or scenario is None:
+    if scenario is None:
         raise ScenarioError(_in_order(problems))
     scenario._provenance = provenance
+    if scenario.motion.recorded is not None:
+        problems.extend(_read_log(library, text, root, scenario))
+    if problems:
+        raise ScenarioError(_in_order(problems))
     problems.extend(motion_problems(scenario))
     if problems:
         raise ScenarioError(_in_order(problems))
@@ -120,6 +124,22 @@ def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenanc
                 provenance.meshes[link, shape] = name
             except SourceRule as error:
                 problems.append(problem_at(root, ("links", link, "shapes", shape, "file"), str(error)))
+    return problems
+
+
+def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> list[Problem]:
+    """Read the log of recorded motion, which is looked for like a mesh, and what it says of the joints."""
+    from replay.scenario.recorded import PATH, tracks
+
+    node, provenance = find(root, (*PATH, "file")), scenario.provenance
+    assert node is not None
+    try:
+        name = resolve_name(str(node.value), text.names[node.place.file])
+        provenance.sources[name] = library.read(name)
+    except SourceRule as error:
+        return [problem_at(root, (*PATH, "file"), str(error))]
+    found, problems = tracks(scenario, library.shown(name), provenance.sources[name])
+    provenance.tracks.update(found)
     return problems
 
 

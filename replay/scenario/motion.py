@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -66,6 +66,41 @@ Waypoints = Annotated[tuple[Waypoint, ...], Field(min_length=1), AfterValidator(
 Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_increasing)]
 
 
+class RecordedJoint(Part):
+    """The joint of a log that moves a joint of the scenario."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """What the log calls it."""
+    unit: Literal["rad", "deg", "mrad", "m", "cm", "mm", "um", "km", "in"] | None = None
+    """Unit of the positions in the log; rad or m when left out."""
+
+
+class TimeColumn(Part):
+    """The times of a CSV file."""
+
+    column: Annotated[str, Field(min_length=1)] = "time"
+    """Heading of the column."""
+    unit: Literal["s", "ms", "us", "min"] = "s"
+    """Its unit."""
+
+
+class Recorded(Part):
+    """Joint positions from a log; between samples they are interpolated linearly, outside the ends hold."""
+
+    file: Annotated[str, Field(min_length=1)]
+    """A .mcap (of replay, Foxglove or ROS 2) or .csv file inside the scenario's folder tree."""
+    topic: str | None = None
+    """Topic of the joint states in a .mcap file; /joint_states when left out."""
+    time: TimeColumn | None = None
+    """Column with the times of a .csv file; `time` in seconds when left out."""
+    joints: dict[Name, RecordedJoint] = Field(default_factory=dict)
+    """The log's joint by joint of the scenario; when left out, the joints that both have under the same name."""
+    start: Time = 0.0
+    """Time [s] after the log's first sample at which the scenario begins."""
+    max_gap: Time = 1.0
+    """Longest time [s] between two samples that is bridged in a straight line; a longer one is an error."""
+
+
 class Motion(Part):
     """What moves; all other joints hold their initial position."""
 
@@ -75,3 +110,5 @@ class Motion(Part):
     """Moves, planned in this order."""
     free: dict[Name, Keyframes] = Field(default_factory=dict)
     """Pose key frames by the name of a free joint."""
+    recorded: Recorded | None = None
+    """Joint positions from a log."""

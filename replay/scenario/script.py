@@ -53,6 +53,7 @@ def script(scenario: Scenario) -> Script:
             for move in motion.moves
         ),
         free={name: tuple(_keyframe(key) for key in keyframes) for name, keyframes in motion.free.items()},
+        recorded=scenario.provenance.tracks,
     )
 
 
@@ -75,6 +76,8 @@ def motion_problems(scenario: Scenario) -> Iterator[Problem]:
 def _where(scenario: Scenario, joint: str, time: float) -> tuple[str | int, ...]:
     """Return the path of the entry that moves a joint at a time."""
     points = scenario.motion.points.get(joint)
+    if joint in scenario.provenance.tracks:
+        return ("motion", "recorded", "joints", joint)
     if points is None:
         return ("motion", "moves", next(k for k, move in enumerate(scenario.motion.moves) if joint in move.to))
     index = bisect.bisect_right([point.time for point in points], time) - 1

@@ -13,10 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from replay.errors import Problem
 from replay.scenario.node import Node, Place
+
+if TYPE_CHECKING:
+    from replay.kinematics.motion import Track
 
 PACKAGE: Final = "package://"
 MAX_FILE_BYTES: Final = 1 << 30
@@ -49,12 +52,14 @@ class Provenance:
         main: name of the scenario file itself.
         sources: every file the scenario needs, by name.
         meshes: name of the mesh file of each mesh shape, by (link, shape).
+        tracks: recorded motion by joint, read from a log among the sources.
         root: the text's tree, includes merged.
     """
 
     main: str = ""
     sources: dict[str, bytes] = field(default_factory=dict)
     meshes: dict[tuple[str, str], str] = field(default_factory=dict)
+    tracks: dict[str, Track] = field(default_factory=dict, compare=False)
     root: Node | None = field(default=None, compare=False)
 
     @cached_property

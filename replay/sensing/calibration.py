@@ -1,7 +1,7 @@
 """Fit of a capacitive sensor's constants to a measured curve.
 
-Model: C = eps I + C_0, where I [m] is the sensor's integral of dA/dist over what it senses (its reading for eps = 1)
-and C_0 its stray capacitance. Two quantities can be measured:
+Model: C = eps I + C_0, where I [m] is the integral of dA/dist over what the sensor senses, its reading at permittivity
+1, and C_0 its stray capacitance. Two quantities can be measured:
 
     capacitance     y = C                               determines eps and C_0
     delta output    y = V_in C / (C_couple + C)         determines kappa = eps / C_couple and C_0 / C_couple only

@@ -15,6 +15,8 @@ def folder(tmp_path):
     (tmp_path / "b.yaml").write_text(SCENARIO.format(name="near", tags="nightly, arm"))
     (tmp_path / "parts" / "a.yml").write_text(SCENARIO.format(name="far", tags="arm"))
     (tmp_path / "notes.txt").write_text("version: 1\n")
+    (tmp_path / ".venv").mkdir()
+    (tmp_path / ".venv" / "foreign.yaml").write_text("version: 3\n")
     return tmp_path
 
 

@@ -1,13 +1,18 @@
 """The commands as a user meets them: output, files, exit codes."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 import replay
+import replay.batch.run
+import replay.batch.select
 from replay.cli.exit_codes import ExitCode, worst
 from replay.cli.main import run
 
@@ -117,9 +122,12 @@ def test_info_salvages_a_cut_file_with_exit_code_3(recorded, tmp_path, capsys):
     part.write_bytes(data[: len(data) * 9 // 10])
     assert run(["info", str(part)]) is ExitCode.LOSSES
     assert "salvaged" in capsys.readouterr().err
-    whole = tmp_path / "cut.mcap"
-    whole.write_bytes(part.read_bytes())
-    assert run(["info", str(whole)]) is ExitCode.INVALID
+    cut = tmp_path / "cut.mcap"  # a copy that was stopped, say
+    cut.write_bytes(part.read_bytes())
+    assert run(["info", str(cut)]) is ExitCode.LOSSES
+    assert run(["export", str(cut), "--format", "csv", "-o", str(tmp_path), "--topic", "/tf"]) is ExitCode.LOSSES
+    cut.write_bytes(data[:30])
+    assert run(["info", str(cut)]) is ExitCode.INVALID
 
 
 def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
@@ -171,3 +179,88 @@ def test_exit_codes_win_in_the_order_of_the_design():
     codes = [ExitCode(code) for code in (0, 5, 1, 3, 4, 2, 130)]
     assert [worst(codes[: k + 1]) for k in range(len(codes))] == codes
     assert worst([]) is ExitCode.FINE
+
+
+def test_a_crash_fails_its_scenario_and_no_other(tmp_path, monkeypatch, capsys):
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.yaml").write_text(
+            SCENARIO.replace("EXPECTED", "never").replace("name: swing", f"name: {name}", 1)
+        )
+    build = replay.batch.run.build
+
+    def crashing(scenario, **options):
+        if scenario.name == "first":
+            raise MemoryError("no room for 8 GiB")
+        return build(scenario, **options)
+
+    monkeypatch.setattr(replay.batch.run, "build", crashing)
+    assert run(["run", str(tmp_path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FAILED
+    text = capsys.readouterr().out
+    assert "first: failed" in text and "crashed: MemoryError: no room for 8 GiB" in text
+    assert "second: passed" in text
+    assert "Traceback" in (tmp_path / "out" / "first" / "log.txt").read_text()
+    assert sorted(file.name for file in (tmp_path / "out" / "first").iterdir()) == ["log.txt", "result.json"]
+
+
+def test_a_fault_of_the_program_never_looks_like_a_difference(scenario, monkeypatch, capsys):
+    def broken(_):
+        raise RuntimeError("unforeseen")
+
+    monkeypatch.setattr(replay.batch.select, "load_all", broken)
+    assert run(["validate", str(scenario)]) is ExitCode.FAILED
+    assert "fault of replay: RuntimeError: unforeseen" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_no_half_recordings(tmp_path, number):
+    path = tmp_path / "long.yaml"
+    path.write_text(SCENARIO.replace("EXPECTED", "never").replace("duration: 1 s", "duration: 2000 s"))
+    with subprocess.Popen([sys.executable, "-m", "replay", "run", str(path), "-o", str(tmp_path / "out")]) as process:
+        deadline = time.monotonic() + 60.0
+        while not list(tmp_path.glob("out/swing/*.mcap.part")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(number)
+        assert process.wait(timeout=60.0) == ExitCode.INTERRUPTED
+    assert list(tmp_path.glob("out/swing/*")) == []
+    assert (tmp_path / "out" / "run.json").is_file()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
+def test_the_viewer_does_not_outlive_the_command(tmp_path):
+    viewer = tmp_path / "viewer"
+    viewer.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
+    viewer.chmod(0o700)
+    (tmp_path / "a.rrd").write_bytes(b"")
+    code = (
+        "import pathlib, replay.recording.viewer as v; from replay.cli.main import main;"
+        f"v.viewer_binary = lambda: pathlib.Path({str(viewer)!r}); main(['view', {str(tmp_path / 'a.rrd')!r}])"
+    )
+    with subprocess.Popen([sys.executable, "-c", code]) as process:
+        deadline = time.monotonic() + 30.0
+        pid = tmp_path / "pid"
+        while not (pid.is_file() and pid.read_text().strip()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.terminate()
+        assert process.wait(timeout=30.0) == ExitCode.INTERRUPTED
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
+
+
+def test_an_interruption_that_native_code_swallows_is_not_lost(scenario, tmp_path):
+    code = """if True:
+        import os, signal, sys, replay.batch.run as batch
+        build = batch.build
+        def swallowing(scenario, **options):
+            try:
+                os.kill(os.getpid(), signal.SIGTERM)
+            except KeyboardInterrupt:
+                pass
+            return build(scenario, **options)
+        batch.build = swallowing
+        from replay.cli.main import main
+        main(sys.argv[1:])
+    """
+    command = [sys.executable, "-c", code, "run", str(scenario), "-o", str(tmp_path), "--no-rrd"]
+    assert subprocess.run(command, check=False).returncode == ExitCode.INTERRUPTED
+    assert list(tmp_path.glob("swing/*")) == []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from fractions import Fraction
 
 import numba
 import numpy as np
@@ -24,6 +25,22 @@ def placed(points, pose, origin):
     """Return R p + (t - origin) in extended precision, from the doubles as they are."""
     points, pose, origin = (np.asarray(value).astype(Wide) for value in (points, pose, origin))
     return points @ pose[:3, :3].T + (pose[:3, 3] - origin)
+
+
+def exact_gap(a, b, pose_a, pose_b, direction):
+    """Return how far apart two posed vertex sets are along a direction, in rational arithmetic but for the last root.
+
+    No point of b is nearer to any point of a than this: a lower bound on the distance that no rounding has touched.
+    """
+    along = [Fraction(value) for value in direction.tolist()]
+    heights = []
+    for points, pose in ((a, pose_a), (b, pose_b)):
+        turn = [[Fraction(value) for value in row] for row in pose[:3].tolist()]
+        tilted = [sum(along[i] * turn[i][j] for i in range(3)) for j in range(4)]
+        heights.append(
+            [sum(x * Fraction(y) for x, y in zip(tilted, p, strict=False)) + tilted[3] for p in points.tolist()]
+        )
+    return float(min(heights[1]) - max(heights[0])) / math.sqrt(float(sum(x * x for x in along)))
 
 
 def _directions(points, edges):

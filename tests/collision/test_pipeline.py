@@ -56,7 +56,14 @@ def concave():
     return Solid(np.concatenate([long, short + np.array([0.0, 0, 1e-3])]))
 
 
-SOLIDS = (cube(0.4), cylinder(0.2, 0.5, 0.02), arc(0.6, 2.0, 0.1, 0.1, 0.03), concave(), plane((0.5, 0.3)))
+SOLIDS = (
+    cube(0.4),
+    cylinder(0.2, 0.5, 0.02),
+    arc(0.6, 2.0, 0.1, 0.1, 0.03),
+    concave(),
+    plane((0.5, 0.3)),
+    sphere(0.2, 0.002),  # enough vertices to be climbed
+)
 
 
 def test_levels_and_clearances_agree_with_brute_force():

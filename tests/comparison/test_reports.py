@@ -1,4 +1,4 @@
-"""The same difference as text, JSON, JUnit, HTML, suggested rules and a rerun overlay; and the command over them all."""
+"""A difference as text, JSON, JUnit, HTML, suggested rules and a rerun overlay; and the command over them all."""
 
 import json
 from html.parser import HTMLParser
@@ -8,10 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pyarrow as pa
 import pytest
-from click.testing import CliRunner
 from rerun.chunk import RrdReader
 
-from replay.cli.diff import diff as command
+from replay.cli import main
 from replay.comparison.difference import Verdict
 from replay.comparison.outputs import Outputs
 from replay.comparison.overlay import write_overlay
@@ -28,6 +27,7 @@ from tests.comparison import made_up
 
 BASELINE = made_up.recording()
 PAIR = "arm/beam|stand/base"
+DIGEST = BASELINE.provenance.files["meshes/beam.stl"]
 HOSTILE = "<script>alert(1)</script>\x07&'\""
 
 
@@ -78,7 +78,7 @@ def test_text_is_short_and_says_where_and_how_much():
         "  provenance (does not decide)",
         f"    libraries.numpy: {np.__version__} -> 9.9",
         "  scene",
-        f"    /files/meshes/beam.stl: sha256 {BASELINE.provenance.files['meshes/beam.stl'][:12]}... -> sha256 ffffffffffff...",
+        f"    /files/meshes/beam.stl: sha256 {DIGEST[:12]}... -> sha256 ffffffffffff...",
         f"  changed: /collision/evaluated/{PAIR}",
         "    1 event shifted; 2 of 100 frames differ",
         "    evaluation of the clearance begins 2 frames later (+33.33 ms): "
@@ -285,33 +285,55 @@ def test_the_overlay_shows_both_runs_and_the_moments(folders, tmp_path):
     assert any("contact begins 2 frames later" in line for line in texts)
 
 
-def run(*arguments):
-    return CliRunner().invoke(command, [str(argument) for argument in arguments])
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Return what `replay diff` returns and writes to stdout and stderr."""
+    monkeypatch.setitem(main.COMMANDS, "diff", "")
+
+    def call(*arguments):
+        code = main.run(["diff", *map(str, arguments)])
+        return (int(code), *capsys.readouterr())
+
+    return call
 
 
-def test_the_command_says_it_by_its_exit_code(folders, tmp_path):
+def test_the_command_says_it_by_its_exit_code(folders, tmp_path, run):
     same = folders / "a" / "same" / "same.mcap", folders / "b" / "same" / "same.mcap"
     other = folders / "a" / "other" / "other.mcap", folders / "b" / "other" / "other.mcap"
-    done = run(*same)
-    assert (done.exit_code, done.output) == (0, "same: made_up: all 55 signals equal in 100 frames\n")
-    done = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
-    assert (done.exit_code, json.loads(done.output)["verdict"]) == (1, "different")
+    assert run(*same) == (0, "same: made_up: all 55 signals equal in 100 frames\n", "")
+    code, out, _ = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
+    assert (code, json.loads(out)["verdict"]) == (1, "different")
     assert "contact begins" in (tmp_path / "new" / "d.html").read_text(encoding="utf-8")
     ElementTree.fromstring((tmp_path / "d.xml").read_bytes())
-    done = run(*other, "--suggest-rules")
-    assert (done.exit_code, MARK in done.output) == (1, True)
-    done = run(folders / "a", folders / "b", "-v", "--rrd", tmp_path / "overlays")
-    assert done.exit_code == 1
+    code, out, _ = run(*other, "--suggest-rules")
+    assert (code, MARK in out) == (1, True)
+    code, out, _ = run(folders / "a", folders / "b", "-v", "--rrd", tmp_path / "overlays")
+    assert code == 1
     assert [path.name for path in (tmp_path / "overlays").iterdir()] == ["other.rrd"]
-    assert isinstance(run(folders / "none.mcap", same[1]).exception, RecordingError)
-    assert run(same[0]).exit_code == 2
 
 
-def test_the_command_applies_rules(folders, tmp_path):
+def test_the_command_says_what_it_cannot_read(folders, tmp_path, run):
+    good = folders / "a" / "same" / "same.mcap"
+    code, _, err = run(tmp_path / "none.mcap", good)
+    assert (code, "none.mcap: cannot be read: No such file" in err) == (2, True)
+    code, _, err = run(good, folders)
+    assert (code, "must be a file" in err) == (2, True)
+    damaged = bytearray(good.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "damaged.mcap").write_bytes(damaged)
+    code, _, err = run(good, tmp_path / "damaged.mcap")
+    assert (code, "damaged" in err) == (2, True)
+    (tmp_path / "rules.yaml").write_text("rules_version: 1\nrules: [{signal: x}]\n")
+    code, _, err = run(good, good, "--rules", tmp_path / "rules.yaml")
+    assert (code, "rules.yaml:2:18: rules[0].signal = 'x'" in err) == (2, True)
+    assert run(good)[0] == 2
+
+
+def test_the_command_applies_rules(folders, tmp_path, run):
     rules = tmp_path / "rules.yaml"
-    rules.write_text("version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
-    assert run(folders / "a", folders / "b", "--rules", rules).exit_code == 0
-    assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance").exit_code == 1
+    rules.write_text("rules_version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
+    assert run(folders / "a", folders / "b", "--rules", rules)[0] == 0
+    assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance")[0] == 1
 
 
 def test_a_report_that_cannot_be_written_is_an_error(tmp_path):

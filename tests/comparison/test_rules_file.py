@@ -1,5 +1,6 @@
 import datetime
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -28,7 +29,7 @@ def written(tmp_path, text):
 
 def test_a_rule_says_all_it_can(tmp_path):
     text = """
-version: 1
+rules_version: 1
 rules:
   - {signal: "/collision/*", abs: 1e-9, rel: 1, time: 20 ms, nan: fail, zero: signed, reason: r, link: "https://x/1"}
   - {signal: ["/tf/*", "*/d[ab]"], ignore: true, reason: "why", expires: 2027-03-31}
@@ -47,7 +48,7 @@ rules:
 
 def test_the_first_rule_that_matches_counts(tmp_path):
     text = """
-version: 1
+rules_version: 1
 rules:
   - {signal: "/collision/clearance/*", abs: 1, reason: first}
   - {signal: "/collision/*", abs: 2, reason: second}
@@ -60,7 +61,7 @@ rules:
 
 def test_an_expired_rule_applies_no_longer_and_is_reported(tmp_path):
     text = """
-version: 1
+rules_version: 1
 rules:
   - {signal: "/joint_states/*", abs: 1, reason: known, expires: 2027-03-31}
   - {signal: "/tf/*", abs: 1, reason: unused, expires: 2027-01-01}
@@ -103,13 +104,15 @@ rules:
 )
 def test_what_is_wrong_is_said_with_its_place(tmp_path, rule, place, message):
     with pytest.raises(ScenarioError) as caught:
-        read_rules(written(tmp_path, f"version: 1\nrules:\n  - {rule}\n"))
+        read_rules(written(tmp_path, f"rules_version: 1\nrules:\n  - {rule}\n"))
     (line,) = str(caught.value).splitlines()
     assert f"rules.yaml:{place}: " in line
     assert message in line
 
 
-@pytest.mark.parametrize("text", ["", "[]", "version: 2\nrules: []", "version: 1", "rules: []", "version: 1\nrules: 3"])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "rules_version: 2\nrules: []", "rules_version: 1", "rules: []", "rules_version: 1\nrules: 3"]
+)
 def test_files_that_are_no_rules(tmp_path, text):
     with pytest.raises(ScenarioError, match=r"rules\.yaml"):
         read_rules(written(tmp_path, text))
@@ -125,7 +128,7 @@ def test_the_schema_is_up_to_date_and_accepts_the_shipped_rules():
     shipped = parse(SHIPPED.read_bytes(), "rules.yaml", []).data()
     validator.validate(shipped)
     for wrong in ({"signal": "/x"}, {"signal": "x", "reason": "r"}, {"signal": "/x", "reason": "r", "abz": 1}):
-        assert not validator.is_valid({"version": 1, "rules": [wrong]})
+        assert not validator.is_valid({"rules_version": 1, "rules": [wrong]})
 
 
 def test_shipped_rules_give_every_signal_a_tolerance_with_a_reason():
@@ -157,3 +160,7 @@ def test_a_literal_pattern_matches_its_name_alone():
     exact = Rule((literal_pattern(name),), EXACT, "r")
     assert exact.matches(name)
     assert not exact.matches("/distance/what1ab/distance")
+
+
+def test_the_shipped_rules_are_not_taken_for_a_scenario():
+    assert re.search(rb"^version\s*:", SHIPPED.read_bytes(), re.MULTILINE) is None

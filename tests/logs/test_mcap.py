@@ -15,9 +15,8 @@ from mcap.writer import CompressionType, Writer
 
 from replay.errors import RecordingError, RecordingExistsError, WriteError
 from replay.logs.columns import read_topics
-from replay.logs.mcap_chunks import MAX_CHUNK
 from replay.logs.mcap_reader import McapLog
-from replay.logs.mcap_records import MAGIC, Op
+from replay.logs.mcap_records import MAGIC, MAX_CHUNK, Op
 from replay.logs.part_file import PartFile
 from replay.logs.protobuf import descriptor_set
 

@@ -14,6 +14,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from replay.errors import InvalidValue, RecordingError, RecordingExistsError
+from replay.logs import mcap_writer
 from replay.numerics import transforms
 from replay.recording import provenance
 from replay.recording.reader import Recording, read
@@ -173,6 +174,18 @@ def test_scenes_without_sensors_pairs_or_joints_come_back(tmp_path: Path) -> Non
     assert recording.joint_positions.shape == (3, 0)
     assert recording.collision is None and recording.distance is None and recording.capacitive is None
     assert recording.events == ()
+
+
+def test_blocks_too_large_for_a_chunk_are_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path) -> None:
+    monkeypatch.setattr(mcap_writer, "_CHUNK_BYTES", 20_000)
+    cut = write(tmp_path / "cut.mcap")
+    assert cut.read_bytes() != path.read_bytes()
+    assert_same(read(cut), list(synthetic.blocks(FRAMES)))
+    part = tmp_path / "cut.part"
+    part.write_bytes(cut.read_bytes()[:-100_000])
+    salvaged = read(part, salvage=True)
+    assert len(salvaged.time) == 256
+    assert_same(salvaged, list(synthetic.blocks(FRAMES)))
 
 
 def test_what_may_not_be_written_is_refused(path: Path, tmp_path: Path) -> None:

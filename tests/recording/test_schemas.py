@@ -7,9 +7,10 @@ from pathlib import Path
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from grpc_tools import protoc
 
-import replay.recording
+import replay
 
-SCHEMAS = Path(replay.recording.__file__).parent / "schemas"
+SCHEMAS = Path(replay.__file__).parents[1] / "schemas"
+COMPILED = Path(replay.__file__).parent / "recording" / "replay.binpb"
 
 
 def test_the_compiled_types_are_those_of_the_sources(tmp_path: Path) -> None:
@@ -17,12 +18,12 @@ def test_the_compiled_types_are_those_of_the_sources(tmp_path: Path) -> None:
     sources = sorted(path.name for path in SCHEMAS.glob("*.proto"))
     assert protoc.main(["protoc", f"-I{SCHEMAS}", f"--descriptor_set_out={target}", *sources]) == 0
     fresh = FileDescriptorSet.FromString(target.read_bytes())
-    shipped = FileDescriptorSet.FromString((SCHEMAS / "replay.binpb").read_bytes())
+    shipped = FileDescriptorSet.FromString(COMPILED.read_bytes())
     assert shipped == fresh, "run `make schemas`"
 
 
 def test_field_numbers_stay_what_they_were_in_format_1() -> None:
-    shipped = FileDescriptorSet.FromString((SCHEMAS / "replay.binpb").read_bytes())
+    shipped = FileDescriptorSet.FromString(COMPILED.read_bytes())
     numbers = {m.name: {f.name: f.number for f in m.field} for file in shipped.file for m in file.message_type}
     assert numbers == {
         "CollisionStates": {"level": 1, "clearance": 2, "evaluated": 3, "undecided": 4},

@@ -19,7 +19,7 @@ RATES = st.one_of(
 def test_times_are_rounded_half_to_even_from_the_exact_fraction(rate, begin, count):
     expected = [round(Fraction(k) * 10**9 / rate) for k in range(begin, begin + count)]
     assert time_ns(rate, begin, begin + count).tolist() == expected
-    assert seconds(rate, begin, begin + count).tolist() == [float(k / rate) for k in range(begin, begin + count)]
+    assert seconds(rate, begin, begin + count).tolist() == [float(Fraction(ns, 10**9)) for ns in expected]
 
 
 def test_halves_go_to_the_even_neighbour():

@@ -106,11 +106,11 @@ def _unit_normal(triangle: Floats, result: Floats) -> None:
 @kernel
 def _add_triangle(triangle: Floats, weight: float, node: Floats, moments: Floats) -> None:
     for point in range(7):
-        a, b, c = TRIANGLE_7[point, 0], TRIANGLE_7[point, 1], TRIANGLE_7[point, 2]
+        a, b, c = TRIANGLE_7[0, point], TRIANGLE_7[1, point], TRIANGLE_7[2, point]
         x = a * triangle[0, 0] + b * triangle[1, 0] + c * triangle[2, 0] - node[CENTROID]
         y = a * triangle[0, 1] + b * triangle[1, 1] + c * triangle[2, 1] - node[CENTROID + 1]
         z = a * triangle[0, 2] + b * triangle[1, 2] + c * triangle[2, 2] - node[CENTROID + 2]
-        w = weight * TRIANGLE_7[point, 3]
+        w = weight * TRIANGLE_7[3, point]
         d = (x, y, z)
         pairs = (x * x, y * y, z * z, x * y, x * z, y * z)
         place = FOURTH

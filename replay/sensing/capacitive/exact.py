@@ -117,6 +117,12 @@ def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: 
 @kernel
 def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
     """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE."""
+    if outside != NONE:
+        farthest = polygon[0, outside]
+        for k in range(1, count):
+            farthest = max(farthest, polygon[k, outside])
+        if farthest <= 0.0:
+            return 0
     first = border if outside == NONE else outside
     sign = -1.0 if outside == NONE else 1.0
     kept = 0
@@ -133,14 +139,15 @@ def _fan(piece: Floats, count: int, u: int, v: int) -> float:
     """Return the sum of share x mean of 1/|(u, v, z)| over the triangles that fan out from a piece's first corner."""
     total = 0.0
     for k in range(1, count - 1):
-        a, b, c = piece[0], piece[k], piece[k + 1]
-        share = _share(a, b, c)
+        share = _share(piece, 0, k, k + 1)
         if share <= 0.0:
             continue
         if u == NONE and v == NONE:
-            mean = mean_inverse_linear(a[HEIGHT], b[HEIGHT], c[HEIGHT])
+            mean = mean_inverse_linear(piece[0, HEIGHT], piece[k, HEIGHT], piece[k + 1, HEIGHT])
         else:
-            mean = mean_over_triangle(_distance(a, u, v), _distance(b, u, v), _distance(c, u, v))
+            mean = mean_over_triangle(
+                _distance(piece, 0, u, v), _distance(piece, k, u, v), _distance(piece, k + 1, u, v)
+            )
         # the triangle as a whole is finite: an infinite mean belongs to a piece which only rounding made
         if mean < math.inf or share > _ROUNDING_SHARE:
             total += share * mean
@@ -148,22 +155,25 @@ def _fan(piece: Floats, count: int, u: int, v: int) -> float:
 
 
 @kernel
-def _share(a: Floats, b: Floats, c: Floats) -> float:
+def _share(piece: Floats, a: int, b: int, c: int) -> float:
     """Return the area of a piece's triangle over the whole one's, from the two coordinates that are smallest there."""
-    in_a = a[SHARE_A] + b[SHARE_A] + c[SHARE_A]
-    in_b = a[SHARE_B] + b[SHARE_B] + c[SHARE_B]
-    in_c = a[SHARE_C] + b[SHARE_C] + c[SHARE_C]
+    in_a = piece[a, SHARE_A] + piece[b, SHARE_A] + piece[c, SHARE_A]
+    in_b = piece[a, SHARE_B] + piece[b, SHARE_B] + piece[c, SHARE_B]
+    in_c = piece[a, SHARE_C] + piece[b, SHARE_C] + piece[c, SHARE_C]
     first, second = SHARE_B, SHARE_C
     if in_b >= in_a and in_b >= in_c:
         first = SHARE_A
     elif in_c >= in_a:
         second = SHARE_A
-    return abs((b[first] - a[first]) * (c[second] - a[second]) - (b[second] - a[second]) * (c[first] - a[first]))
+    share = (piece[b, first] - piece[a, first]) * (piece[c, second] - piece[a, second]) - (
+        piece[b, second] - piece[a, second]
+    ) * (piece[c, first] - piece[a, first])
+    return abs(share)  # type: ignore[no-any-return]
 
 
 @kernel
-def _distance(corner: Floats, u: int, v: int) -> tuple[float, float, float]:
-    return (corner[u] if u != NONE else 0.0, corner[v] if v != NONE else 0.0, corner[HEIGHT])
+def _distance(piece: Floats, corner: int, u: int, v: int) -> tuple[float, float, float]:
+    return (piece[corner, u] if u != NONE else 0.0, piece[corner, v] if v != NONE else 0.0, piece[corner, HEIGHT])
 
 
 @kernel

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics import transforms
 from replay.sensing.capacitive.integral import SIDES, check_half_size
 
 Floats = NDArray[np.float64]
@@ -33,8 +34,8 @@ class Plate:
 
     def __post_init__(self) -> None:
         check_half_size(self.half_size)
-        if np.shape(self.T_link_plate) != (4, 4) or not np.isfinite(self.T_link_plate).all():
-            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a finite (4, 4) pose")
+        if np.shape(self.T_link_plate) != (4, 4) or not _is_rigid(np.asarray(self.T_link_plate, dtype=np.float64)):
+            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a rigid (4, 4) pose")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,3 +85,10 @@ class CapacitiveSensor:
     def senses(self, link: int) -> bool:
         """Return whether shapes on a link are sensed."""
         return link != self.link and link not in self.ignored_links
+
+
+def _is_rigid(T: Floats) -> bool:
+    if not np.isfinite(T).all() or not np.array_equal(T[3], [0.0, 0.0, 0.0, 1.0]):
+        return False
+    products = transforms.compose(transforms.invert(T), T)[:3, :3]
+    return bool(np.abs(products - np.eye(3)).max() < 1e-9 and np.linalg.det(T[:3, :3]) > 0.0)

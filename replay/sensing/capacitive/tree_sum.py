@@ -14,8 +14,8 @@ h the largest distance of a corner from the centroid, d a point's place about it
 - A cluster takes orders 0, 2, 3, 4 from its moments (order 1 vanishes at the centroid):
   E = A spread4 h / (r^6 (1 - x)), spread4 the mean of |d|^4.
 - Part of it may lie over a border, by at most w: there 1/dist is expanded in the wrong region's form, whose squared
-  distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3), mean(w^2) <= min(largest w^2, variance across the
-  border). No cluster is clipped for it.
+  distance is off by at most w^2: E += A mean(w^2) / (2 (r - h)^3). A point at d across the border, of at most D, lies
+  over it by w <= d (W/D), W the largest w: mean(w^2) <= min(W^2, (W/D)^2 mean(d^2)). No cluster is clipped for it.
 - A single triangle takes the first that fits of: 1 point, E = A spread2/(r - h)^3, borders or not, as the Hessian of
   1/dist is at most 2/dist^3; 3 points of degree 2, E = c A h spread2/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4
   spread2/(r^7 (1 - x)); 16 points of degree 8, E = c A h^7 spread2/(r^10 (1 - x)); all but the first plus the border's
@@ -35,27 +35,22 @@ from replay.numerics.jit import kernel
 from replay.sensing.capacitive.clusters import (
     AREA,
     CENTROID,
-    FOURTH,
     LOWER,
     NORMAL,
     OPENING,
     RADIUS,
     SECOND,
     SPREAD4,
-    THIRD,
     UPPER,
     Clusters,
 )
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.triangle_rules import PIECES, allowance, triangle_within
+from replay.sensing.capacitive.expansion import mean_by_moments
+from replay.sensing.capacitive.triangle_rules import PIECES, RULE_POINTS, allowance, triangle_within
 from replay.sensing.capacitive.triangle_sum import into_plate
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-# Legendre's fourth polynomial, 35 t^2 - 30 t + 3 = 35 (t - _T1)(t - _T2) in t = cos^2, lets one product of M4 do.
-_T1 = (30.0 + math.sqrt(480.0)) / 70.0
-_T2 = (30.0 - math.sqrt(480.0)) / 70.0
 
 
 @kernel
@@ -82,7 +77,7 @@ def sum_tree(
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
     bound = np.zeros((n, plates))
     scratch, pieces, corners = np.empty(SCRATCH), np.empty((PIECES, 4, 3)), np.empty((3, 3))
-    stack = np.empty(MAX_DEPTH + 1, np.int64)
+    terms, stack = np.empty(RULE_POINTS), np.empty(MAX_DEPTH + 1, np.int64)
     for frame in range(n):
         for plate in range(plates):
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _walk(
@@ -96,6 +91,7 @@ def sum_tree(
                 rtol,
                 scratch,
                 pieces,
+                terms,
                 corners,
                 stack,
             )
@@ -114,6 +110,7 @@ def _walk(
     rtol: float,
     scratch: Floats,
     pieces: Floats,
+    terms: Floats,
     corners: Floats,
     stack: NDArray[np.int64],
 ) -> tuple[float, bool, float]:
@@ -126,13 +123,12 @@ def _walk(
     )
     stack[0] = 0
     size = 1
-    nodes, moments = clusters.nodes, clusters.moments
+    nodes, moments, triangles, areas = clusters.nodes, clusters.moments, clusters.triangles, clusters.areas
     while size > 0:
         size -= 1
         index = stack[size]
-        node = nodes[index]
-        x, y, z = _place(T, node[CENTROID], node[CENTROID + 1], node[CENTROID + 2])
-        h, area = node[RADIUS], node[AREA]
+        x, y, z = _place(T, nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2])
+        h, area = nodes[index, RADIUS], nodes[index, AREA]
         if not both and z + h < 0.0:
             continue
         u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
@@ -141,21 +137,21 @@ def _walk(
         if r > 2.0 * h:
             share = rtol * area / (r + h)
             allowed = allowance(share, saved)
-            error = area * node[SPREAD4] * h / (r * r * r * r * r * (r - h))
+            error = area * nodes[index, SPREAD4] * h / (r * r * r * r * r * (r - h))
             if error <= allowed:
                 verdict = 1
                 if not both and z - h <= 0.0:
-                    verdict = _side(node, T, z)
+                    verdict = _side(nodes, index, T, z)
                 if facing and verdict == 1:
-                    verdict = _faces(node, centre)
+                    verdict = _faces(nodes, index, centre)
                 if verdict == -1:
                     continue
                 if verdict == 1:
-                    over_x = _border(node, moments[index], T, 0, x, half_x, h)
-                    over_y = _border(node, moments[index], T, 1, y, half_y, h)
+                    over_x = _border(nodes, moments, index, T, 0, x, half_x, h)
+                    over_y = _border(nodes, moments, index, T, 1, y, half_y, h)
                     error += area * (over_x + over_y) / (2.0 * (r - h) ** 3)
                     if error <= allowed:
-                        total, e = two_sum(total, area * _expansion(moments[index], T, u, v, z, r))
+                        total, e = two_sum(total, area * mean_by_moments(moments, index, T, u, v, z, r))
                         lost += e
                         saved += share - error
                         spent += error
@@ -166,9 +162,9 @@ def _walk(
             size += 2
             continue
         for k in range(tree.begin[index], tree.end[index]):
-            into_plate(T, clusters.triangles[k], corners)
+            into_plate(T, triangles, k, corners)
             value, share, error, touches = triangle_within(
-                corners, clusters.areas[k], half_x, half_y, both, facing, rtol, saved, scratch, pieces
+                corners, areas[k], half_x, half_y, both, facing, rtol, saved, scratch, pieces, terms
             )
             touching = touching or touches
             if value == math.inf:
@@ -190,37 +186,41 @@ def _place(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float
 
 
 @kernel
-def _reach(node: Floats, T: Floats, axis: int, sign: float) -> float:
+def _reach(nodes: Floats, index: int, T: Floats, axis: int, sign: float) -> float:
     """Return how far the node's box reaches from its centroid along a plate axis, sign +1 or -1."""
     reach = 0.0
     for k in range(3):
         e = sign * T[axis, k]
-        reach += e * (node[UPPER + k] if e > 0.0 else node[LOWER + k])
-    return min(reach, node[RADIUS])
+        reach += e * (nodes[index, UPPER + k] if e > 0.0 else nodes[index, LOWER + k])
+    return min(reach, nodes[index, RADIUS])  # type: ignore[no-any-return]
 
 
 @kernel
-def _side(node: Floats, T: Floats, z: float) -> int:
+def _side(nodes: Floats, index: int, T: Floats, z: float) -> int:
     """Return 1 when the node is in front of the plate's plane, -1 when it is behind, 0 when it may be both."""
-    if z - _reach(node, T, 2, -1.0) > 0.0:
+    if z - _reach(nodes, index, T, 2, -1.0) > 0.0:
         return 1
-    return -1 if z + _reach(node, T, 2, 1.0) < 0.0 else 0
+    return -1 if z + _reach(nodes, index, T, 2, 1.0) < 0.0 else 0
 
 
 @kernel
-def _faces(node: Floats, centre: tuple[float, float, float]) -> int:
+def _faces(nodes: Floats, index: int, centre: tuple[float, float, float]) -> int:
     """Return 1 when all triangles of the node face the plate's centre, -1 when none does, 0 when it may be either.
 
     With v from the centroid to the centre, the angle between a normal and the way from a corner to the centre differs
     from that between the cone's axis and v by at most the cone's half angle plus asin(h/|v|), which must stay below 90
     degrees: all face the centre when the cosine of the angle to v exceeds the sine of that sum.
     """
-    cx, cy, cz = centre[0] - node[CENTROID], centre[1] - node[CENTROID + 1], centre[2] - node[CENTROID + 2]
+    cx, cy, cz = (
+        centre[0] - nodes[index, CENTROID],
+        centre[1] - nodes[index, CENTROID + 1],
+        centre[2] - nodes[index, CENTROID + 2],
+    )
     distance = math.sqrt(cx * cx + cy * cy + cz * cz)
-    h, opening = node[RADIUS], node[OPENING]
+    h, opening = nodes[index, RADIUS], nodes[index, OPENING]
     if opening <= 0.0 or h >= distance:
         return 0
-    cosine = (cx * node[NORMAL] + cy * node[NORMAL + 1] + cz * node[NORMAL + 2]) / distance
+    cosine = (cx * nodes[index, NORMAL] + cy * nodes[index, NORMAL + 1] + cz * nodes[index, NORMAL + 2]) / distance
     sine_cone = math.sqrt(max(0.0, 1.0 - opening * opening))
     sine_ball = h / distance
     cosine_ball = math.sqrt(max(0.0, 1.0 - sine_ball * sine_ball))
@@ -233,7 +233,9 @@ def _faces(node: Floats, centre: tuple[float, float, float]) -> int:
 
 
 @kernel
-def _border(node: Floats, moments: Floats, T: Floats, axis: int, position: float, half: float, h: float) -> float:
+def _border(
+    nodes: Floats, moments: Floats, index: int, T: Floats, axis: int, position: float, half: float, h: float
+) -> float:
     """Return a bound of mean(w^2) [m^2], w the depth by which the node lies over the two borders across one axis."""
     if abs(abs(position) - half) >= h and abs(abs(position) + half) >= h:
         return 0.0
@@ -242,49 +244,17 @@ def _border(node: Floats, moments: Floats, T: Floats, axis: int, position: float
         sign = 1.0 - 2.0 * side
         # towards the border at sign x half, from whichever side of it the centroid is on
         gap = half - sign * position
-        beyond = _reach(node, T, axis, sign if gap >= 0.0 else -sign) - abs(gap)
+        reach = _reach(nodes, index, T, axis, sign if gap >= 0.0 else -sign)
+        beyond = reach - abs(gap)
         if beyond > 0.0:
             a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
-            variance = a * a * moments[SECOND] + b * b * moments[SECOND + 1] + c * c * moments[SECOND + 2]
-            variance += 2.0 * (a * b * moments[SECOND + 3] + a * c * moments[SECOND + 4] + b * c * moments[SECOND + 5])
-            over += min(beyond * beyond, variance)
+            variance = (
+                a * a * moments[index, SECOND] + b * b * moments[index, SECOND + 1] + c * c * moments[index, SECOND + 2]
+            )
+            variance += 2.0 * (
+                a * b * moments[index, SECOND + 3]
+                + a * c * moments[index, SECOND + 4]
+                + b * c * moments[index, SECOND + 5]
+            )
+            over += min(beyond * beyond, variance * (beyond / reach) ** 2)
     return over
-
-
-@kernel
-def _expansion(moments: Floats, T: Floats, u: float, v: float, z: float, r: float) -> float:
-    """Return the mean of 1/dist over a node, from its moments up to the fourth.
-
-    With n the unit vector of r in the body's frame, t = (n.d)^2 and q = |Pd|^2 are quadratic forms of d. Orders 2, 3, 4
-    are the means of (3 t - q)/2, n.d (5 t - 3 q)/2 and (35 t^2 - 30 t q + 3 q^2)/8 = 35/8 (t - _T1 q)(t - _T2 q).
-    """
-    inverse = 1.0 / r
-    n0 = (T[0, 0] * u + T[1, 0] * v + T[2, 0] * z) * inverse
-    n1 = (T[0, 1] * u + T[1, 1] * v + T[2, 1] * z) * inverse
-    n2 = (T[0, 2] * u + T[1, 2] * v + T[2, 2] * z) * inverse
-    drop_x, drop_y = 1.0 if u == 0.0 else 0.0, 1.0 if v == 0.0 else 0.0
-    x0, x1, x2, y0, y1, y2 = T[0, 0], T[0, 1], T[0, 2], T[1, 0], T[1, 1], T[1, 2]
-    # entries xy, xz, yz count twice
-    t = (n0 * n0, n1 * n1, n2 * n2, 2.0 * n0 * n1, 2.0 * n0 * n2, 2.0 * n1 * n2)
-    q = (
-        1.0 - drop_x * x0 * x0 - drop_y * y0 * y0,
-        1.0 - drop_x * x1 * x1 - drop_y * y1 * y1,
-        1.0 - drop_x * x2 * x2 - drop_y * y2 * y2,
-        -2.0 * (drop_x * x0 * x1 + drop_y * y0 * y1),
-        -2.0 * (drop_x * x0 * x2 + drop_y * y0 * y2),
-        -2.0 * (drop_x * x1 * x2 + drop_y * y1 * y2),
-    )
-    order2, order3, order4 = 0.0, 0.0, 0.0
-    place = FOURTH
-    for i in range(6):
-        order2 += (1.5 * t[i] - 0.5 * q[i]) * moments[SECOND + i]
-        along = n0 * moments[THIRD + i] + n1 * moments[THIRD + 6 + i] + n2 * moments[THIRD + 12 + i]
-        order3 += (2.5 * t[i] - 1.5 * q[i]) * along
-        first, second = t[i] - _T1 * q[i], t[i] - _T2 * q[i]
-        order4 += first * second * moments[place]
-        place += 1
-        for j in range(i + 1, 6):
-            order4 += (first * (t[j] - _T2 * q[j]) + second * (t[j] - _T1 * q[j])) * moments[place]
-            place += 1
-    order4 *= 35.0 / 8.0
-    return inverse * (1.0 + inverse * inverse * (order2 - inverse * (order3 - inverse * order4)))

@@ -14,7 +14,6 @@ from replay.sensing.capacitive.exact import integral_over_triangle
 from replay.sensing.capacitive.triangle_sum import faces_centre
 
 Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
 
 _GREED = 8.0
 """A node may take up to this many times its own share of the budget, if earlier nodes have left it."""
@@ -23,13 +22,16 @@ _THRIFT = 0.25
 """Largest part of what earlier nodes have left that one node may take."""
 
 
-FITS, NEAR, CROSSES_X, CROSSES_Y = range(4)
-"""Verdicts on a point rule: it fits; the triangle is too near for it; a border in x or y must be cut first."""
+FITS, NEAR, CROSSES_X, CROSSES_Y, CROSSES_Z = range(5)
+"""Verdicts on a point rule: it fits; the triangle is too near; a border in x, in y, or z = 0 must be cut first."""
 
 _RULE_3, _RULE_7, _RULE_16 = 0.12, 0.065, 0.005
 """Error constants of the point rules, twice the worst of 20 000 triangles (slivers too) at h/r = 0.06..0.5 in regions
 of each kind. Rigorous are 1.5, 2 and 2, from the terms of Legendre's expansion at their largest, but no triangle comes
 near: 0.056, 0.031 and 0.002 were the worst."""
+
+RULE_POINTS = 16
+"""Most points of a rule."""
 
 PIECES = 16
 """Most pieces of one triangle: each of five planes replaces a piece by at most three, one after the other."""
@@ -53,6 +55,7 @@ def triangle_within(
     saved: float,
     scratch: Floats,
     pieces: Floats,
+    terms: Floats,
 ) -> tuple[float, float, float, bool]:
     """Return the integral over a triangle (3, 3) in the plate's frame, its share, its error bound, if it touches.
 
@@ -70,23 +73,22 @@ def triangle_within(
         for axis in range(3):
             pieces[0, k, axis] = corners[k, axis]
     pieces[0, 3, 0] = area
-    size = 1
-    if not both and min(z0, z1, z2) < 0.0:
-        size = 0 if touches else _cut(pieces, 1, 2, 0.0, True)
-    near = size == 0
+    size, near = 1, False
+    verdict = CROSSES_Z if not both and min(z0, z1, z2) < 0.0 else FITS
+    if verdict == CROSSES_Z and touches:
+        near = True
     while size > 0 and not near:
-        piece = pieces[size - 1]
-        value, own, e, verdict = _by_points(piece, piece[3, 0], half_x, half_y, rtol, saved)
+        if verdict != CROSSES_Z:
+            value, own, e, verdict = _by_points(pieces, size - 1, half_x, half_y, rtol, saved, terms)
         if verdict == FITS:
             total, share, error = total + value, share + own, error + e
             saved += own - e
             size -= 1
-        elif verdict == CROSSES_X:
-            size = _cut(pieces, size, 0, _border_between(piece, 0, half_x), False)
-        elif verdict == CROSSES_Y:
-            size = _cut(pieces, size, 1, _border_between(piece, 1, half_y), False)
-        else:
+        elif verdict == NEAR:
             near = True
+        else:
+            size = _cut(pieces, size, verdict - CROSSES_X, half_x, half_y)
+            verdict = FITS
     if not near:
         return total, share, error, touches
     value = integral_over_triangle(corners, area, half_x, half_y, both, scratch)
@@ -94,110 +96,149 @@ def triangle_within(
 
 
 @kernel
-def _border_between(piece: Floats, axis: int, half: float) -> float:
-    """Return the border, half or -half, that has corners on both sides."""
-    low, high = min(piece[0, axis], piece[1, axis], piece[2, axis]), max(piece[0, axis], piece[1, axis], piece[2, axis])
-    return half if low < half < high else -half
+def _cut(pieces: Floats, size: int, axis: int, half_x: float, half_y: float) -> int:
+    """Replace the last piece by its parts on either side of a border across an axis, or by those above z = 0.
 
-
-@kernel
-def _cut(pieces: Floats, size: int, axis: int, border: float, only_beyond: bool) -> int:
-    """Replace the last piece by its two or three parts on either side of a plane; return the new number of pieces."""
-    last = pieces[size - 1]
-    beyond_0, beyond_1, beyond_2 = last[0, axis] > border, last[1, axis] > border, last[2, axis] > border
+    Returns the new number of pieces.
+    """
+    last = size - 1
+    only_beyond = axis == 2
+    border = 0.0 if only_beyond else (half_x if axis == 0 else half_y)
+    low, high = (
+        min(pieces[last, 0, axis], pieces[last, 1, axis], pieces[last, 2, axis]),
+        max(pieces[last, 0, axis], pieces[last, 1, axis], pieces[last, 2, axis]),
+    )
+    if not low < border < high:
+        border = -border
+    beyond_0, beyond_1, beyond_2 = (
+        pieces[last, 0, axis] > border,
+        pieces[last, 1, axis] > border,
+        pieces[last, 2, axis] > border,
+    )
     alone = 0 if beyond_1 == beyond_2 else (1 if beyond_0 == beyond_2 else 2)
-    area = last[3, 0]
-    ax, ay, az = last[alone, 0], last[alone, 1], last[alone, 2]
+    area = pieces[last, 3, 0]
+    ax, ay, az = pieces[last, alone, 0], pieces[last, alone, 1], pieces[last, alone, 2]
     j, k = (alone + 1) % 3, (alone + 2) % 3
-    bx, by, bz = last[j, 0], last[j, 1], last[j, 2]
-    cx, cy, cz = last[k, 0], last[k, 1], last[k, 2]
-    is_beyond = last[alone, axis] > border
-    gap = last[alone, axis] - border
-    s, t = gap / (last[alone, axis] - last[j, axis]), gap / (last[alone, axis] - last[k, axis])
+    bx, by, bz = pieces[last, j, 0], pieces[last, j, 1], pieces[last, j, 2]
+    cx, cy, cz = pieces[last, k, 0], pieces[last, k, 1], pieces[last, k, 2]
+    is_beyond = pieces[last, alone, axis] > border
+    gap = pieces[last, alone, axis] - border
+    s, t = (
+        gap / (pieces[last, alone, axis] - pieces[last, j, axis]),
+        gap / (pieces[last, alone, axis] - pieces[last, k, axis]),
+    )
     p = (ax + s * (bx - ax), ay + s * (by - ay), az + s * (bz - az))
     q = (ax + t * (cx - ax), ay + t * (cy - ay), az + t * (cz - az))
     p = (border if axis == 0 else p[0], border if axis == 1 else p[1], border if axis == 2 else p[2])
     q = (border if axis == 0 else q[0], border if axis == 1 else q[1], border if axis == 2 else q[2])
     size -= 1
-    if is_beyond or not only_beyond:
-        size = _put(pieces, size, (ax, ay, az), p, q, area * s * t)
-    if not is_beyond or not only_beyond:
-        size = _put(pieces, size, (bx, by, bz), (cx, cy, cz), q, area * (1.0 - t))
-        size = _put(pieces, size, (bx, by, bz), q, p, area * t * (1.0 - s))
+    for part in range(3):
+        if only_beyond and is_beyond != (part == 0):
+            continue
+        first = (ax, ay, az) if part == 0 else (bx, by, bz)
+        second = p if part == 0 else ((cx, cy, cz) if part == 1 else q)
+        third = p if part == 2 else q
+        for k in range(3):
+            pieces[size, 0, k], pieces[size, 1, k], pieces[size, 2, k] = first[k], second[k], third[k]
+        pieces[size, 3, 0] = area * (s * t if part == 0 else (1.0 - t if part == 1 else t * (1.0 - s)))
+        size += 1
     return size
 
 
 @kernel
-def _put(pieces: Floats, size: int, a: Triple, b: Triple, c: Triple, area: float) -> int:
-    for axis in range(3):
-        pieces[size, 0, axis], pieces[size, 1, axis], pieces[size, 2, axis] = a[axis], b[axis], c[axis]
-    pieces[size, 3, 0] = area
-    return size + 1
-
-
-@kernel
 def _by_points(
-    corners: Floats, area: float, half_x: float, half_y: float, rtol: float, saved: float
+    pieces: Floats, index: int, half_x: float, half_y: float, rtol: float, saved: float, terms: Floats
 ) -> tuple[float, float, float, int]:
     """Return integral, share, error bound and verdict of the cheapest point rule that fits, if one does."""
-    x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
-    y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
-    z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
+    area = pieces[index, 3, 0]
+    x = (pieces[index, 0, 0] + pieces[index, 1, 0] + pieces[index, 2, 0]) / 3.0
+    y = (pieces[index, 0, 1] + pieces[index, 1, 1] + pieces[index, 2, 1]) / 3.0
+    z = (pieces[index, 0, 2] + pieces[index, 1, 2] + pieces[index, 2, 2]) / 3.0
     u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
     v = y - math.copysign(half_y, y) if abs(y) > half_y else 0.0
     r = math.sqrt(u * u + v * v + z * z)
-    squares, largest, variance_x, variance_y, over_x, over_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    squares, largest = 0.0, 0.0
     for k in range(3):
-        dx, dy, dz = corners[k, 0] - x, corners[k, 1] - y, corners[k, 2] - z
+        dx, dy, dz = pieces[index, k, 0] - x, pieces[index, k, 1] - y, pieces[index, k, 2] - z
         square = dx * dx + dy * dy + dz * dz
         squares += square
         largest = max(largest, square)
-        variance_x += dx * dx / 12.0
-        variance_y += dy * dy / 12.0
-        over_x = max(over_x, _over(corners[k, 0], u, x, half_x))
-        over_y = max(over_y, _over(corners[k, 1], v, y, half_y))
-    h, spread = math.sqrt(largest), squares / 12.0
-    if r <= 2.0 * h:
+    if r * r <= 4.0 * largest:
         return 0.0, 0.0, 0.0, NEAR
+    h, spread = math.sqrt(largest), squares / 12.0
     share = rtol * area / (r + h)
     allowed = allowance(share, saved)
-    nearest = r - h
-    cube = area * spread / (nearest * nearest * nearest)
+    nearest = 1.0 / (r - h)
+    cube = area * spread * nearest * nearest * nearest
     if cube <= allowed:
         return area / r, share, cube, FITS
-    ratio = h / r
-    cube = area * spread / (r * r * nearest)
-    best = _RULE_16 * cube * ratio**7
-    if best > allowed:
+    inverse = 1.0 / r
+    ratio = h * inverse
+    smooth = area * spread * nearest * inverse * inverse
+    ratio_3 = ratio * ratio * ratio
+    error_3, error_7 = _RULE_3 * smooth * ratio, _RULE_7 * smooth * ratio_3 * ratio
+    error_16 = _RULE_16 * smooth * ratio_3 * ratio_3 * ratio
+    if error_16 > allowed:
         return 0.0, 0.0, 0.0, NEAR
-    border_x = area * min(over_x * over_x, variance_x) / (2.0 * nearest**3)
-    border_y = area * min(over_y * over_y, variance_y) / (2.0 * nearest**3)
-    border = border_x + border_y
-    if border + best > allowed:
-        return 0.0, 0.0, 0.0, (CROSSES_X if border_x >= border_y else CROSSES_Y)
+    border = 0.0
+    if abs(abs(x) - half_x) < h or abs(abs(y) - half_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
+        border_x = 0.5 * area * _border(pieces, index, 0, x, half_x) * nearest * nearest * nearest
+        border_y = 0.5 * area * _border(pieces, index, 1, y, half_y) * nearest * nearest * nearest
+        border = border_x + border_y
+        if border + error_16 > allowed:
+            return 0.0, 0.0, 0.0, (CROSSES_X if border_x >= border_y else CROSSES_Y)
     keep_x, keep_y = 0.0 if u == 0.0 else 1.0, 0.0 if v == 0.0 else 1.0
     total = 0.0
-    if border + _RULE_3 * cube * ratio <= allowed:
+    if border + error_3 <= allowed:
         for k in range(3):
-            px = u + keep_x * 0.5 * (corners[k, 0] - x)
-            py = v + keep_y * 0.5 * (corners[k, 1] - y)
-            pz = z + 0.5 * (corners[k, 2] - z)
+            px = u + keep_x * 0.5 * (pieces[index, k, 0] - x)
+            py = v + keep_y * 0.5 * (pieces[index, k, 1] - y)
+            pz = z + 0.5 * (pieces[index, k, 2] - z)
             total += 1.0 / math.sqrt(px * px + py * py + pz * pz)
-        return area * total / 3.0, share, border + _RULE_3 * cube * ratio, FITS
-    fits_7 = border + _RULE_7 * cube * ratio**4 <= allowed
-    rule = TRIANGLE_7 if fits_7 else TRIANGLE_16
-    for k in range(len(rule)):
-        a, b, c = rule[k, 0], rule[k, 1], rule[k, 2]
-        px = u + keep_x * (a * corners[0, 0] + b * corners[1, 0] + c * corners[2, 0] - x)
-        py = v + keep_y * (a * corners[0, 1] + b * corners[1, 1] + c * corners[2, 1] - y)
-        pz = a * corners[0, 2] + b * corners[1, 2] + c * corners[2, 2]
-        total += rule[k, 3] / math.sqrt(px * px + py * py + pz * pz)
-    return area * total, share, border + (_RULE_7 * cube * ratio**4 if fits_7 else best), FITS
+        return area * total / 3.0, share, border + error_3, FITS
+    fits_7 = border + error_7 <= allowed
+    if fits_7:
+        total = _points(TRIANGLE_7, pieces, index, u - x * keep_x, v - y * keep_y, keep_x, keep_y, terms)
+        return area * total, share, border + error_7, FITS
+    total = _points(TRIANGLE_16, pieces, index, u - x * keep_x, v - y * keep_y, keep_x, keep_y, terms)
+    return area * total, share, border + error_16, FITS
 
 
 @kernel
-def _over(position: float, beyond: float, centroid: float, half: float) -> float:
-    """Return how far a corner's coordinate lies outside the slab of the centroid, which is `beyond` the plate."""
-    if beyond == 0.0:
-        return max(abs(position) - half, 0.0)
-    return max(half - math.copysign(1.0, centroid) * position, 0.0)
+def _points(
+    rule: Floats,
+    pieces: Floats,
+    index: int,
+    shift_x: float,
+    shift_y: float,
+    keep_x: float,
+    keep_y: float,
+    terms: Floats,
+) -> float:
+    """Return the mean of 1/dist by a symmetric rule; the first loop has no sum in it, so that it is vectorised."""
+    ax, ay, az = keep_x * pieces[index, 0, 0] + shift_x, keep_y * pieces[index, 0, 1] + shift_y, pieces[index, 0, 2]
+    bx, by, bz = keep_x * pieces[index, 1, 0] + shift_x, keep_y * pieces[index, 1, 1] + shift_y, pieces[index, 1, 2]
+    cx, cy, cz = keep_x * pieces[index, 2, 0] + shift_x, keep_y * pieces[index, 2, 1] + shift_y, pieces[index, 2, 2]
+    for k in range(rule.shape[1]):
+        a, b, c = rule[0, k], rule[1, k], rule[2, k]
+        px, py, pz = a * ax + b * bx + c * cx, a * ay + b * by + c * cy, a * az + b * bz + c * cz
+        terms[k] = rule[3, k] / math.sqrt(px * px + py * py + pz * pz)
+    total = 0.0
+    for k in range(rule.shape[1]):
+        total += terms[k]
+    return total
+
+
+@kernel
+def _border(pieces: Floats, index: int, axis: int, centroid: float, half: float) -> float:
+    """Return a bound of mean(w^2) [m^2], w the depth by which a triangle lies outside its centroid's slab."""
+    over, variance = 0.0, 0.0
+    for k in range(3):
+        offset = pieces[index, k, axis] - centroid
+        variance += offset * offset / 12.0
+        if abs(centroid) > half:
+            over = max(over, half - math.copysign(1.0, centroid) * pieces[index, k, axis])
+        else:
+            over = max(over, abs(pieces[index, k, axis]) - half)
+    gap = abs(abs(centroid) - half)
+    return min(over * over, variance * (over / (over + gap)) ** 2) if over > 0.0 else 0.0

@@ -28,10 +28,13 @@ def triangle_areas(triangles: Floats) -> Floats:
 
 
 @kernel
-def into_plate(T_plate_body: Floats, triangle: Floats, result: Floats) -> None:
-    """Write a triangle's corners in the plate's frame to `result` (3, 3)."""
+def into_plate(T_plate_body: Floats, triangles: Floats, index: int, result: Floats) -> None:
+    """Write the corners of a triangle of (n, 3, 3) in the plate's frame to `result` (3, 3).
+
+    Here and elsewhere an array goes with an index instead of a row of it: a view costs as much as the arithmetic.
+    """
     for k in range(3):
-        x, y, z = triangle[k, 0], triangle[k, 1], triangle[k, 2]
+        x, y, z = triangles[index, k, 0], triangles[index, k, 1], triangles[index, k, 2]
         for r in range(3):
             result[k, r] = T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
 
@@ -39,10 +42,10 @@ def into_plate(T_plate_body: Floats, triangle: Floats, result: Floats) -> None:
 @kernel
 def faces_centre(triangle: Floats) -> bool:
     """Return whether the outer side of a triangle in the plate's frame holds the plate's centre, n.(0 - a) > 0."""
-    a, b, c = triangle[0], triangle[1], triangle[2]
-    bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    cx, cy, cz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    outward = (by * cz - bz * cy) * a[0] + (bz * cx - bx * cz) * a[1] + (bx * cy - by * cx) * a[2]
+    ax, ay, az = triangle[0, 0], triangle[0, 1], triangle[0, 2]
+    bx, by, bz = triangle[1, 0] - ax, triangle[1, 1] - ay, triangle[1, 2] - az
+    cx, cy, cz = triangle[2, 0] - ax, triangle[2, 1] - ay, triangle[2, 2] - az
+    outward = (by * cz - bz * cy) * ax + (bz * cx - bx * cz) * ay + (bx * cy - by * cx) * az
     return outward < 0.0  # type: ignore[no-any-return]
 
 
@@ -74,9 +77,10 @@ def sum_triangles(
     for frame in range(n):
         for plate in range(plates):
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
+            T = T_plate_body[frame, plate]
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
-                into_plate(T_plate_body[frame, plate], triangles[k], corners)
+                into_plate(T, triangles, k, corners)
                 if contact(corners, areas[k], half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True
                 if facing and not faces_centre(corners):
