@@ -97,7 +97,14 @@ def _count(
 
 
 def _line(family: str, name: str, *, asked: int = 0, note: str = "") -> dict[str, Any]:
-    return {"family": family, "method": name, "asked": asked, **dict.fromkeys(_COUNTS, 0), "worst error": "", "note": note}
+    return {
+        "family": family,
+        "method": name,
+        "asked": asked,
+        **dict.fromkeys(_COUNTS, 0),
+        "worst error": "",
+        "note": note,
+    }
 
 
 def _missing(package: str) -> str:
