@@ -37,7 +37,7 @@ def as_floats(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Flo
     if array.size == 0 and array.ndim == 1 and shape[0] is None:
         array = array.reshape(0, *(length or 0 for length in shape[1:]))
     if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise InvalidValue(f"{name}.shape", array.shape, f"must be {wanted}")
+        raise InvalidValue(name, f"array of shape {array.shape}", f"must have shape {wanted}")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 

@@ -27,7 +27,7 @@ def test_real_numbers_of_any_kind_become_float64(value):
 
 def test_empty_sequences_have_the_shape_that_is_asked_for():
     assert as_floats("triangles", [], (None, 3, 3)).shape == (0, 3, 3)
-    with pytest.raises(InvalidValue, match=r"apex\.shape = \(0,\): must be \(3,\)"):
+    with pytest.raises(InvalidValue, match=r"apex = array of shape \(0,\): must have shape \(3,\)"):
         as_floats("apex", [], (3,))
 
 
