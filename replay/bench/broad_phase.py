@@ -49,7 +49,9 @@ def add_to(report: Report, *, frames: int, most: int, rounds: int) -> None:
     report.plots.append(Plot("cost of a frame", "bodies", "s per frame", lines, joined=True))
     for name, points in lines.items():
         power = exponent(points)
-        report.notes.append(f"{name}: the cost of a frame grows like n^{power:.2f} from {sizes[0]} to {sizes[-1]} bodies.")
+        report.notes.append(
+            f"{name}: the cost of a frame grows like n^{power:.2f} from {sizes[0]} to {sizes[-1]} bodies."
+        )
 
 
 def tightness(frames: int, rounds: int) -> Grid:

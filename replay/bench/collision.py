@@ -43,7 +43,9 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
     report = Report("collision")
     rows = easy(several, count=250 if quick else 1000, rounds=rounds)
     report.tables["queries of unrelated pairs"] = rows
-    report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(several, count=32 if quick else 96, rounds=1)
+    report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(
+        several, count=32 if quick else 96, rounds=1
+    )
     report.goals += _goals(rows, several)
     report.plots += [
         pareto_plot(f"{call}: {body}", [row for row in rows if row.case == f"{body}, near, {call}"], "error / size")
@@ -182,9 +184,7 @@ def _goals(rows: Sequence[Row], engines: Sequence[Engine]) -> list[Goal]:
     ours = engines[0].name
     goals = []
     for peer in ("python-fcl", "coal"):
-        ratios = [
-            ratio(rows, f"{body}, {place}, boolean", peer, ours) for body in BODIES for place in PLACES
-        ]
+        ratios = [ratio(rows, f"{body}, {place}, boolean", peer, ours) for body in BODIES for place in PLACES]
         known = [value for value in ratios if not np.isnan(value)]
         least = min(known) if len(known) == len(ratios) else float("nan")
         goals.append(Goal(f"GJK boolean, least over 8..642 vertices, against {peer}", ">= 3x", least, 3.0))

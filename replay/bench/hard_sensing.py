@@ -139,7 +139,10 @@ def hard_boxes(count: int, *, seed: int = 9) -> list[dict[str, Any]]:
         "octahedron": (octahedron, math.sqrt(2.0) * math.sqrt(2.0) * 2.0),
         "regular tetrahedron": (tetrahedron, 8.0),
         "cylinder": (cylinder, 4.0),
-        "cube with a dense corner": (np.concatenate([box((1.0, 1.0, 1.0)), 0.5 - 1e-3 * unit(np.random.default_rng(1), 200) ** 2]), 1.0),
+        "cube with a dense corner": (
+            np.concatenate([box((1.0, 1.0, 1.0)), 0.5 - 1e-3 * unit(np.random.default_rng(1), 200) ** 2]),
+            1.0,
+        ),
     }
     rng = np.random.default_rng(seed)
     questions = []
