@@ -50,7 +50,9 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
 
 pictures: setup system  ## render the README's pictures from the recordings that `make run` left
-	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3
+	mkdir -p scenarios/pictures
+	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.9
+	$(BIN)/replay view $(RECORDINGS)/carm_parking/carm_parking.rrd --screenshot scenarios/pictures/carm_parking.png --at 4.2
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
