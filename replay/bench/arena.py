@@ -1,4 +1,4 @@
-"""Asks a contestant in a process of its own: a crash, a hang or an error is an outcome, and the next question follows."""
+"""Asks contestants in processes of their own: a crash, a hang or an error is an outcome, and the next is asked."""
 
 from __future__ import annotations
 

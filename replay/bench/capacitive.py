@@ -117,17 +117,17 @@ def _race(
     tolerances: Sequence[float],
     rounds: int,
 ) -> list[Row]:
-    """Time closed form, splits and tree; the closed form is the reference, itself judged by `replay bench stability`."""
+    """Time closed form, splits and tree; the closed form is the reference, judged itself by `bench stability`."""
     poses = np.ascontiguousarray(T_plate_body[:, None])
     areas, tree = triangle_areas(triangles), triangle_tree(triangles)
     clusters = make_clusters(triangles, tree)
     truth = sum_triangles(triangles, areas, poses, half, False, False, EXACT)[0].ravel()
 
     def by_triangles(number: int) -> Answer:
-        return lambda: sum_triangles(triangles, areas, poses, half, False, False, number)[0].ravel()
+        return lambda: sum_triangles(triangles, areas, poses, half, False, False, number)[0][:, 0]
 
     def by_tree(rtol: float) -> Answer:
-        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0].ravel()
+        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0][:, 0]
 
     def contender(name: str, answer: Answer, tolerance: float) -> Contender:
         return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))

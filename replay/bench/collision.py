@@ -53,7 +53,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
         for call in ("distance",)
     ]
     motion.add_to(report, frames=512 if quick else 2000, rounds=min(rounds, 5))
-    broad_phase.add_to(report, frames=512 if quick else 2000, most=300 if quick else 1000, rounds=min(rounds, 3))
+    broad_phase.add_to(report, frames=512 if quick else 2000, most=1000 if quick else 10_000, rounds=min(rounds, 3))
     return report
 
 

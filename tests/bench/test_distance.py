@@ -40,7 +40,7 @@ def test_the_reference_knows_a_plane_a_border_and_an_edge():
     slope = np.array([[[-50.0, -50.0, -48.0], [50.0, -50.0, -48.0], [0.0, 50.0, 52.0]]])  # z = 2 + y
     border = 2.0 / (math.cos(half) + math.sin(half))
     assert nearest_in_cone(slope, np.zeros(3), up, 2.0 * half) == pytest.approx(border, rel=1e-15)
-    aside = square + [100.0, 0.0, 0.0]
+    aside = square + np.array([100.0, 0.0, 0.0])
     assert nearest_in_cone(aside, np.zeros(3), up, 2.0 * half) == math.inf
 
 
