@@ -59,7 +59,8 @@ def tightness(frames: int, rounds: int) -> Grid:
     relative = np.stack([poses.relative(pair.a, pair.b) for pair in pairs])
     turns = np.ascontiguousarray(np.moveaxis(poses.world[:, :, :3, :3], 1, 0))
     level, task = np.zeros((frames, len(pairs)), np.uint8), np.zeros((frames, len(pairs)), np.uint8)
-    contenders, passed = [], {}
+    contenders: list[Contender] = []
+    passed: dict[str, NDArray[np.bool_]] = {}
     for bounds in VOLUMES:
         volumes = fit_volumes(bodies, arrays, bounds=bounds, pieces="exact")
 

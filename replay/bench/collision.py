@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,7 @@ def race(
             continue
         asked = [_question(engine, call, question) for question in questions]
         total = sum(len(question[2]) for question in questions)
-        contenders.append(Contender(engine.name, lambda asked=asked: _all(asked), total, check))
+        contenders.append(Contender(engine.name, partial(_all, asked), total, check))
     found = {row.method: row for row in compete(case, contenders, rounds=rounds)} | missing
     return [found[engine.name] for engine in engines]
 

@@ -81,7 +81,8 @@ def _eigenvectors(question: dict[str, Any]) -> list[float]:
 def _trimesh(question: dict[str, Any]) -> list[float]:
     import trimesh
 
-    to_origin, extents = trimesh.bounds.oriented_bounds(question["points"])
+    fit: Any = trimesh.bounds.oriented_bounds
+    to_origin, extents = fit(question["points"])
     back = np.linalg.inv(to_origin)
     return [*back[:3, 3], *(0.5 * extents), *back[:3, :3].T.ravel()]
 

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from typing import Any
 
@@ -122,7 +123,7 @@ def run(
     for name in (DEFAULT, FAST):
         check = _checked(report, name, runners[name].run(few), truth)
         runner = runners[name]
-        contenders.append(Contender(name, lambda runner=runner: runner.run(every), len(every), check))
+        contenders.append(Contender(name, partial(runner.run, every), len(every), check))
     rows = compete(CASE, contenders, rounds=rounds or (3 if quick else 5))
     stages = {name: _per_frame(runners[name].seconds, len(every)) for name in (DEFAULT, FAST)}
     # seconds a frame: once is enough, and its answers are those that are checked
