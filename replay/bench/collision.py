@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
         for call in ("distance",)
     ]
     motion.add_to(report, frames=512 if quick else 2000, rounds=min(rounds, 5))
-    broad_phase.add_to(report, frames=512 if quick else 2000, most=300 if quick else 1000, rounds=min(rounds, 3))
+    broad_phase.add_to(report, frames=512 if quick else 2000, most=1000 if quick else 10_000, rounds=min(rounds, 3))
     return report
 
 
@@ -94,7 +95,7 @@ def race(
             continue
         asked = [_question(engine, call, question) for question in questions]
         total = sum(len(question[2]) for question in questions)
-        contenders.append(Contender(engine.name, lambda asked=asked: _all(asked), total, check))
+        contenders.append(Contender(engine.name, partial(_all, asked), total, check))
     found = {row.method: row for row in compete(case, contenders, rounds=rounds)} | missing
     return [found[engine.name] for engine in engines]
 

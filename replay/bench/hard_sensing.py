@@ -51,12 +51,14 @@ def _normals(triangles: Floats) -> Floats:
 
 
 def _towards(vectors: Floats) -> Floats:
-    return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    result: Floats = vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    return result
 
 
 def _inner(rng: np.random.Generator, triangles: Floats) -> Floats:
     weights = 0.05 + 0.85 * rng.dirichlet((1.0, 1.0, 1.0), len(triangles))
-    return np.sum(weights[:, :, None] * triangles, axis=1)
+    result: Floats = np.sum(weights[:, :, None] * triangles, axis=1)
+    return result
 
 
 def _plane_along_axis(rng: np.random.Generator, n: int) -> Cones:
