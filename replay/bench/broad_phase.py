@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,10 +13,10 @@ from replay.bench import carm
 from replay.bench.inputs import rotations
 from replay.bench.measure import Check, Contender, compete, exponent
 from replay.bench.report import Grid, Plot, Report
-from replay.collision.bodies import Bounds, collect, fit_volumes
+from replay.collision.bodies import Bounds, Volumes, collect, fit_volumes
 from replay.collision.broad import COUNTS, sieve
 from replay.collision.columns import Level
-from replay.collision.pairs import CollisionBody, Pair
+from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.primitives import cuboid
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
@@ -33,13 +34,9 @@ def add_to(report: Report, *, frames: int, most: int, rounds: int) -> None:
     sizes = [n for n in (10, 30, 100, 300, 1000, 3000, 10_000) if n <= most]
     rows = []
     for n in sizes:
-        contenders = []
-        poses, bodies, pairs = crowd(n)
-        for bounds in ("obb", "sphere"):
-            engine = CollisionPipeline(bodies, pairs, poses.linkage, bounds=bounds, clearance="never")
-            contenders.append(
-                Contender(f"replay, {bounds}", lambda engine=engine: engine.run(poses), FRAMES, lambda _: Check(0.0))
-            )
+        poses, bodies = crowd(n)
+        rules = PairRules(bodies, poses.linkage)
+        contenders = [_contender(bodies, rules, poses, bounds) for bounds in ("obb", "sphere")]
         rows += compete(f"{n} bodies", contenders, rounds=rounds)
     report.tables[f"cost of a frame against the number of bodies ({FRAMES} frames)"] = rows
     lines = {
@@ -49,7 +46,9 @@ def add_to(report: Report, *, frames: int, most: int, rounds: int) -> None:
     report.plots.append(Plot("cost of a frame", "bodies", "s per frame", lines, joined=True))
     for name, points in lines.items():
         power = exponent(points)
-        report.notes.append(f"{name}: the cost of a frame grows like n^{power:.2f} from {sizes[0]} to {sizes[-1]} bodies.")
+        report.notes.append(
+            f"{name}: the cost of a frame grows like n^{power:.2f} from {sizes[0]} to {sizes[-1]} bodies."
+        )
 
 
 def tightness(frames: int, rounds: int) -> Grid:
@@ -60,13 +59,12 @@ def tightness(frames: int, rounds: int) -> Grid:
     relative = np.stack([poses.relative(pair.a, pair.b) for pair in pairs])
     turns = np.ascontiguousarray(np.moveaxis(poses.world[:, :, :3, :3], 1, 0))
     level, task = np.zeros((frames, len(pairs)), np.uint8), np.zeros((frames, len(pairs)), np.uint8)
-    contenders, passed = [], {}
+    contenders: list[Contender] = []
+    passed: dict[str, NDArray[np.bool_]] = {}
     for bounds in VOLUMES:
         volumes = fit_volumes(bodies, arrays, bounds=bounds, pieces="exact")
 
-        def run(volumes=volumes) -> None:  # type: ignore[no-untyped-def]
-            sieve(volumes, rows, relative, turns, 0.0, level, task, np.zeros(COUNTS, np.int64))
-
+        run = _sieve(volumes, rows, relative, turns, level, task)
         run()
         passed[bounds] = level > 0
         contenders.append(Contender(bounds, run, level.size, lambda _: Check(0.0)))
@@ -90,8 +88,20 @@ def tightness(frames: int, rounds: int) -> Grid:
     return Grid(cells)
 
 
-def crowd(count: int) -> tuple[LinkPoses, list[CollisionBody], list[Pair]]:
-    """Return boxes that float in a cube, each with about as many neighbours whatever their number, and all pairs."""
+def _sieve(
+    volumes: Volumes,
+    rows: NDArray[np.int64],
+    relative: Floats,
+    turns: Floats,
+    level: NDArray[np.uint8],
+    task: NDArray[np.uint8],
+) -> Callable[[], None]:
+    spreads, scratch, counts = np.empty((len(relative), 2)), np.zeros((8, 4)), np.zeros(COUNTS, np.int64)
+    return lambda: sieve(volumes, rows, relative, turns, 0.0, level, task, counts, spreads, scratch)
+
+
+def crowd(count: int) -> tuple[LinkPoses, list[CollisionBody]]:
+    """Return boxes that float in a cube, each with about as many neighbours whatever their number."""
     rng = np.random.default_rng(23)
     names = [f"l{k:05}" for k in range(count)]
     linkage = Linkage([Link(name, None, np.identity(4), Joint(name, JointType.FREE)) for name in names])
@@ -104,8 +114,12 @@ def crowd(count: int) -> tuple[LinkPoses, list[CollisionBody], list[Pair]]:
     poses[..., :3, 3] += drift * np.sin(math.pi * time)
     sizes = np.exp(rng.uniform(-1.6, -0.7, (count, 3)))
     bodies = [CollisionBody(f"{name}/box", k, cuboid(sizes[k].tolist())) for k, name in enumerate(names)]
-    labels = [body.name for body in bodies]
-    pairs = [
-        Pair(f"{labels[a]}|{labels[b]}", a, b, False) for a in range(count) for b in range(a + 1, count)
-    ]  # as planned, without asking the linkage n^2 times
-    return linkage.forward(np.zeros((FRAMES, 0)), poses), bodies, pairs
+    return linkage.forward(np.zeros((FRAMES, 0)), poses), bodies
+
+
+def _contender(
+    bodies: list[CollisionBody], rules: PairRules, poses: LinkPoses, bounds: Literal["obb", "sphere"]
+) -> Contender:
+    """Return what lists the contacts of a crowd; every volume must find the same."""
+    engine = CollisionPipeline(bodies, rules, poses.linkage, bounds=bounds, clearance="never")
+    return Contender(f"replay, {bounds}", lambda: engine.contacts(poses), FRAMES, lambda _: Check(0.0))

@@ -117,25 +117,26 @@ def _race(
     tolerances: Sequence[float],
     rounds: int,
 ) -> list[Row]:
-    """Time closed form, splits and tree; the closed form is the reference, itself judged by `replay bench stability`."""
+    """Time closed form, splits and tree; the closed form is the reference, judged itself by `bench stability`."""
     poses = np.ascontiguousarray(T_plate_body[:, None])
     areas, tree = triangle_areas(triangles), triangle_tree(triangles)
     clusters = make_clusters(triangles, tree)
     truth = sum_triangles(triangles, areas, poses, half, False, False, EXACT)[0].ravel()
 
-    def by_triangles(number: int) -> Answer:
-        return lambda: sum_triangles(triangles, areas, poses, half, False, False, number)[0].ravel()
-
     def by_tree(rtol: float) -> Answer:
-        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0].ravel()
+        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0][:, 0]
 
     def contender(name: str, answer: Answer, tolerance: float) -> Contender:
         return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))
 
-    several = [contender("exact", by_triangles(EXACT), SLACK)]
-    several += [contender(f"midpoint n={n}", by_triangles(n), math.inf) for n in splits]
+    several = [contender("exact", _by_triangles(triangles, areas, poses, EXACT, half), SLACK)]
+    several += [contender(f"midpoint n={n}", _by_triangles(triangles, areas, poses, n, half), math.inf) for n in splits]
     several += [contender(f"tree rtol {rtol:.0e}", by_tree(rtol), rtol + SLACK) for rtol in tolerances]
     return compete(case, several, rounds=rounds)
+
+
+def _by_triangles(triangles: Floats, areas: Floats, poses: Floats, splits: int, half: Floats = PLATE) -> Answer:
+    return lambda: sum_triangles(triangles, areas, poses, half, False, False, splits)[0][:, 0]
 
 
 def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
@@ -166,15 +167,9 @@ def _add_growth(report: Report, *, most: int, rounds: int) -> None:
         tree = triangle_tree(triangles)
         clusters = make_clusters(triangles, tree)
         areas = triangle_areas(triangles)
-        few = poses[:2]
         contenders = [_timed(f"tree rtol {rtol:.0e}", clusters, tree, poses, rtol) for rtol in (1e-4, 1e-6)]
         if size <= 100_000:
-            exact = Contender(
-                "exact",
-                lambda t=triangles, a=areas, p=few: sum_triangles(t, a, p, PLATE, False, False, EXACT)[0],
-                len(few),
-                _finite,
-            )
+            exact = Contender("exact", _by_triangles(triangles, areas, poses[:2], EXACT), 2, _finite)
             contenders.append(exact)
         found = compete(f"torus, {len(triangles)} triangles", contenders, rounds=rounds)
         rows += found

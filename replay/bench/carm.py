@@ -62,7 +62,8 @@ def poses(frames: int) -> LinkPoses:
     swing = {name: width for name, _, _, _, _, width, *_ in _PARTS}
     time = np.arange(frames) / 60.0
     columns = [
-        swing[name] * np.sin(2.0 * math.pi * time * (0.05 + 0.013 * k) + k) for k, name in enumerate(machine.joint_names)
+        swing[name] * np.sin(2.0 * math.pi * time * (0.05 + 0.013 * k) + k)
+        for k, name in enumerate(machine.joint_names)
     ]
     return machine.forward(np.stack(columns, axis=1), np.zeros((frames, 0, 4, 4)))
 
@@ -70,7 +71,10 @@ def poses(frames: int) -> LinkPoses:
 def collision_bodies() -> list[CollisionBody]:
     """Return the bodies as the pipeline takes them."""
     names = linkage().link_names
-    return [CollisionBody(f"{name}/body", k, solid(body)) for k, (name, body) in enumerate(zip(names, bodies(), strict=True))]
+    return [
+        CollisionBody(f"{name}/body", k, solid(body))
+        for k, (name, body) in enumerate(zip(names, bodies(), strict=True))
+    ]
 
 
 def solid(body: Body) -> Solid:

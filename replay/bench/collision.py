@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,9 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
     report = Report("collision")
     rows = easy(several, count=250 if quick else 1000, rounds=rounds)
     report.tables["queries of unrelated pairs"] = rows
-    report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(several, count=32 if quick else 96, rounds=1)
+    report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(
+        several, count=32 if quick else 96, rounds=1
+    )
     report.goals += _goals(rows, several)
     report.plots += [
         pareto_plot(f"{call}: {body}", [row for row in rows if row.case == f"{body}, near, {call}"], "error / size")
@@ -51,7 +54,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
         for call in ("distance",)
     ]
     motion.add_to(report, frames=512 if quick else 2000, rounds=min(rounds, 5))
-    broad_phase.add_to(report, frames=512 if quick else 2000, most=300 if quick else 1000, rounds=min(rounds, 3))
+    broad_phase.add_to(report, frames=512 if quick else 2000, most=1000 if quick else 10_000, rounds=min(rounds, 3))
     return report
 
 
@@ -92,7 +95,7 @@ def race(
             continue
         asked = [_question(engine, call, question) for question in questions]
         total = sum(len(question[2]) for question in questions)
-        contenders.append(Contender(engine.name, lambda asked=asked: _all(asked), total, check))
+        contenders.append(Contender(engine.name, partial(_all, asked), total, check))
     found = {row.method: row for row in compete(case, contenders, rounds=rounds)} | missing
     return [found[engine.name] for engine in engines]
 
@@ -182,9 +185,7 @@ def _goals(rows: Sequence[Row], engines: Sequence[Engine]) -> list[Goal]:
     ours = engines[0].name
     goals = []
     for peer in ("python-fcl", "coal"):
-        ratios = [
-            ratio(rows, f"{body}, {place}, boolean", peer, ours) for body in BODIES for place in PLACES
-        ]
+        ratios = [ratio(rows, f"{body}, {place}, boolean", peer, ours) for body in BODIES for place in PLACES]
         known = [value for value in ratios if not np.isnan(value)]
         least = min(known) if len(known) == len(ratios) else float("nan")
         goals.append(Goal(f"GJK boolean, least over 8..642 vertices, against {peer}", ">= 3x", least, 3.0))

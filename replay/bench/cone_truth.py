@@ -143,7 +143,7 @@ def _step(f: Wide, k: int, side: int) -> np.longdouble:
 
 
 def _samples(sides: Wide, e1: Wide, e2: Wide, v: Wide, h: np.longdouble) -> Wide:
-    """Return angles (m,): an even ring, and for each edge its two crossings' surroundings, which narrow hits hide in."""
+    """Return angles (m,): an even ring, and what surrounds each edge's two crossings, where narrow hits hide."""
     even = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False).astype(np.longdouble)
     near = []
     for s in sides:

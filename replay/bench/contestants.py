@@ -1,13 +1,15 @@
 """What answers the hard questions of `stability`: each by name, given plain values, returning plain values.
 
-A contestant runs in a process of its own, so that a crash or a hang is an outcome and not the end of the run.
+A contestant runs in a process of its own, so that a crash or a hang is an outcome and not the end of the run; all are
+functions (or partial ones) that can be sent there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,14 +23,11 @@ def contestants(subject: str) -> dict[str, tuple[str, Answer]]:
     return {"pairs": _PAIRS, "cones": _CONES, "plates": _PLATES, "boxes": _BOXES}[subject]
 
 
-def _pair(engine: Engine) -> Answer:
-    def answer(question: dict[str, Any]) -> list[float]:
-        """Return [contact 0 or 1, distance]."""
-        a, b = Body(*question["a"]), Body(*question["b"])
-        queries = engine.queries(a, b, question["T_world_a"][None], question["T_world_b"][None])
-        return [float(queries.hits()[0]), float(queries.distances()[0])]
-
-    return answer
+def _pair(engine: Engine, question: dict[str, Any]) -> list[float]:
+    """Return [contact 0 or 1, distance]."""
+    a, b = Body(*question["a"]), Body(*question["b"])
+    queries = engine.queries(a, b, question["T_world_a"][None], question["T_world_b"][None])
+    return [float(queries.hits()[0]), float(queries.distances()[0])]
 
 
 def _exact_cone(question: dict[str, Any]) -> list[float]:
@@ -38,24 +37,17 @@ def _exact_cone(question: dict[str, Any]) -> list[float]:
     return [hit.distance if hit.detected else math.inf]
 
 
-def _model_cone(method: str, **options: Any) -> Answer:
-    def answer(question: dict[str, Any]) -> list[float]:
-        from replay.bench.distance import read_once
+def _model_cone(method: str, engine: str, question: dict[str, Any]) -> list[float]:
+    from replay.bench.distance import read_once
 
-        return [read_once(method, question, **options)]
-
-    return answer
+    return [read_once(method, question, engine=engine)]
 
 
-def _plate(method: str, splits: int = 4) -> Answer:
-    def answer(question: dict[str, Any]) -> list[float]:
-        from replay.sensing.capacitive import plate_integral
+def _plate(method: str, question: dict[str, Any]) -> list[float]:
+    from replay.sensing.capacitive import plate_integral
 
-        triangles = np.array([question["triangle"]])
-        half, side = question["half_size"], question["side"]
-        return [float(plate_integral(triangles, half, side=side, method=method, splits=splits)[0])]
-
-    return answer
+    triangles = np.array([question["triangle"]])
+    return [float(plate_integral(triangles, question["half_size"], side=question["side"], method=method)[0])]
 
 
 def _plate_tree(question: dict[str, Any]) -> list[float]:
@@ -70,14 +62,11 @@ def _plate_tree(question: dict[str, Any]) -> list[float]:
     return [float(sum_tree(make_clusters(triangles, tree), tree, here, half, both, False, 1e-6)[0][0, 0])]
 
 
-def _obb(method: str) -> Answer:
-    def answer(question: dict[str, Any]) -> list[float]:
-        from replay.geometry.bounds import fit_obb
+def _obb(method: Literal["triangles", "vertices"], question: dict[str, Any]) -> list[float]:
+    from replay.geometry.bounds import fit_obb
 
-        box = fit_obb(question["points"], method=method)  # type: ignore[arg-type]
-        return [*box.center, *box.half_widths, *box.axes.ravel()]
-
-    return answer
+    box = fit_obb(question["points"], method=method)
+    return [*box.center, *box.half_widths, *box.axes.ravel()]
 
 
 def _eigenvectors(question: dict[str, Any]) -> list[float]:
@@ -92,29 +81,30 @@ def _eigenvectors(question: dict[str, Any]) -> list[float]:
 def _trimesh(question: dict[str, Any]) -> list[float]:
     import trimesh
 
-    to_origin, extents = trimesh.bounds.oriented_bounds(question["points"])
+    fit: Any = trimesh.bounds.oriented_bounds
+    to_origin, extents = fit(question["points"])
     back = np.linalg.inv(to_origin)
     return [*back[:3, 3], *(0.5 * extents), *back[:3, :3].T.ravel()]
 
 
-_PAIRS = {
-    "replay": ("", _pair(OURS_CHECKED)),
-    **{engine.name: (engine.package, _pair(engine)) for engine in PEERS},
+_PAIRS: dict[str, tuple[str, Answer]] = {
+    "replay": ("", partial(_pair, OURS_CHECKED)),
+    **{engine.name: (engine.package, partial(_pair, engine)) for engine in PEERS},
 }
 _CONES: dict[str, tuple[str, Answer]] = {
     "replay": ("", _exact_cone),
-    "thesis": ("", _model_cone("thesis")),
-    "own, 1000 rays": ("", _model_cone("rays", engine="own")),
-    "embree, 1000 rays": ("embreex", _model_cone("rays", engine="embree")),
+    "thesis": ("", partial(_model_cone, "thesis", "own")),
+    "own, 1000 rays": ("", partial(_model_cone, "rays", "own")),
+    "embree, 1000 rays": ("embreex", partial(_model_cone, "rays", "embree")),
 }
 _PLATES: dict[str, tuple[str, Answer]] = {
-    "replay": ("", _plate("exact")),
+    "replay": ("", partial(_plate, "exact")),
     "replay, tree rtol 1e-6": ("", _plate_tree),
-    "thesis, midpoint n=4": ("", _plate("midpoint")),
+    "thesis, midpoint n=4": ("", partial(_plate, "midpoint")),
 }
 _BOXES: dict[str, tuple[str, Answer]] = {
-    "replay": ("", _obb("triangles")),
-    "replay, obb_vertices": ("", _obb("vertices")),
+    "replay": ("", partial(_obb, "triangles")),
+    "replay, obb_vertices": ("", partial(_obb, "vertices")),
     "covariance of vertices": ("", _eigenvectors),
     "trimesh": ("trimesh", _trimesh),
 }

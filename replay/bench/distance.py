@@ -134,8 +134,8 @@ def _read(sweep: Sweep, poses: Floats) -> Callable[[], Floats]:
 def judge(found: Floats, truth: Floats, *, exact: bool) -> Check:
     """Return what readings are worth; inf is "nothing detected".
 
-    A ray bundle is inexact on purpose: only a reading nearer than the truth is wrong, and what it does not see at all is
-    a miss. A method that claims to be exact is wrong too when it is too far or sees nothing.
+    A ray bundle is inexact on purpose: only a reading nearer than the truth is wrong, and what it does not see at all
+    is a miss. A method that claims to be exact is wrong too when it is too far or sees nothing.
     """
     seen = np.isfinite(found) & np.isfinite(truth)
     missed = ~np.isfinite(found) & np.isfinite(truth)

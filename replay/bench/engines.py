@@ -221,6 +221,7 @@ def _mujoco(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
             meshes += f'<mesh name="{name}" vertex="{corners}"/>'
             geom = f'<geom type="mesh" mesh="{name}"/>'
         geoms += f"<body>{geom}</body>"
+    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log into the current folder
     xml = f"<mujoco><asset>{meshes}</asset><worldbody>{geoms}</worldbody></mujoco>"
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)

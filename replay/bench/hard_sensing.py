@@ -51,12 +51,14 @@ def _normals(triangles: Floats) -> Floats:
 
 
 def _towards(vectors: Floats) -> Floats:
-    return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    result: Floats = vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    return result
 
 
 def _inner(rng: np.random.Generator, triangles: Floats) -> Floats:
     weights = 0.05 + 0.85 * rng.dirichlet((1.0, 1.0, 1.0), len(triangles))
-    return np.sum(weights[:, :, None] * triangles, axis=1)
+    result: Floats = np.sum(weights[:, :, None] * triangles, axis=1)
+    return result
 
 
 def _plane_along_axis(rng: np.random.Generator, n: int) -> Cones:
@@ -139,7 +141,10 @@ def hard_boxes(count: int, *, seed: int = 9) -> list[dict[str, Any]]:
         "octahedron": (octahedron, math.sqrt(2.0) * math.sqrt(2.0) * 2.0),
         "regular tetrahedron": (tetrahedron, 8.0),
         "cylinder": (cylinder, 4.0),
-        "cube with a dense corner": (np.concatenate([box((1.0, 1.0, 1.0)), 0.5 - 1e-3 * unit(np.random.default_rng(1), 200) ** 2]), 1.0),
+        "cube with a dense corner": (
+            np.concatenate([box((1.0, 1.0, 1.0)), 0.5 - 1e-3 * unit(np.random.default_rng(1), 200) ** 2]),
+            1.0,
+        ),
     }
     rng = np.random.default_rng(seed)
     questions = []

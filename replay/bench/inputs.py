@@ -23,7 +23,8 @@ PHANTOM_FILES = {1_000: "adult_male_reduced_1000t.stl", 26_756: "adult_male.stl"
 
 def box(size: tuple[float, float, float]) -> Floats:
     """Return the corners (8, 3) [m] of a box with full edges `size`, about its centre."""
-    return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * np.array(size)
+    corners: Floats = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * np.array(size)
+    return corners
 
 
 def box_surface(size: tuple[float, float, float]) -> Floats:
@@ -41,7 +42,8 @@ def spiral(count: int) -> Floats:
 
 def ellipsoid(count: int, half_axes: tuple[float, float, float]) -> Floats:
     """Return (count, 3) points of an ellipsoid [m], every one a vertex of their hull."""
-    return spiral(count) * np.array(half_axes)
+    points: Floats = spiral(count) * np.array(half_axes)
+    return points
 
 
 def torus(triangles: int, *, major: float = 0.5, minor: float = 0.2) -> Floats:
@@ -83,7 +85,8 @@ def phantom(triangles: int) -> Floats:
 def unit(rng: np.random.Generator, count: int) -> Floats:
     """Return `count` random unit vectors."""
     vectors = rng.normal(size=(count, 3))
-    return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    result: Floats = vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    return result
 
 
 def rotations(rng: np.random.Generator, count: int) -> Floats:

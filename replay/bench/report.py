@@ -236,8 +236,7 @@ def _png(plot: Plot) -> str:
     figure = Figure(figsize=(7.5, 5.0), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
     drawn = {
-        name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points)
-        for name, points in plot.lines.items()
+        name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points) for name, points in plot.lines.items()
     }
     for name, line in drawn.items():
         axes.plot(*zip(*line, strict=True), "o-" if plot.joined else "o", label=name, markersize=5)

@@ -6,13 +6,13 @@ Ours must be all zeros; the table shows where others break.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from replay.bench.arena import Outcome, ask
-from replay.bench.contestants import contestants
+from replay.bench.contestants import Answer, contestants
 from replay.bench.engines import Body
 from replay.bench.hard_pairs import hard_pairs
 from replay.bench.hard_sensing import hard_boxes, hard_cones, hard_plates
@@ -54,14 +54,25 @@ def run(*, quick: bool = False, patience: float = 5.0, subjects: Sequence[str] =
     return report
 
 
-def examine(subject: str, questions: Sequence[Question], patience: float) -> list[dict[str, Any]]:
-    """Return a line for every family and contestant: asked, outcomes by kind, worst error of what was answered."""
+def examine(
+    subject: str,
+    questions: Sequence[Question],
+    patience: float,
+    several: Mapping[str, tuple[str, Answer]] | None = None,
+) -> list[dict[str, Any]]:
+    """Return a line for every family and contestant: asked, outcomes by kind, worst error of what was answered.
+
+    Args:
+        subject: of the questions.
+        questions: see `hard_pairs` and `hard_sensing`.
+        patience: after which an answer is a hang [s].
+        several: contestants, instead of all of the subject.
+    """
     families = list(dict.fromkeys(question["family"] for question in questions))
     judge = _JUDGES[subject]
     answered: dict[str, list[Outcome] | str] = {}
-    for name, (package, _) in contestants(subject).items():
-        why = _missing(package)
-        answered[name] = why or ask(subject, name, questions, patience=patience)
+    for name, (package, answer) in (several or contestants(subject)).items():
+        answered[name] = _missing(package) or ask(answer, questions, patience=patience)
     lines = []
     for family in families:
         for name, outcomes in answered.items():
@@ -97,7 +108,14 @@ def _count(
 
 
 def _line(family: str, name: str, *, asked: int = 0, note: str = "") -> dict[str, Any]:
-    return {"family": family, "method": name, "asked": asked, **dict.fromkeys(_COUNTS, 0), "worst error": "", "note": note}
+    return {
+        "family": family,
+        "method": name,
+        "asked": asked,
+        **dict.fromkeys(_COUNTS, 0),
+        "worst error": "",
+        "note": note,
+    }
 
 
 def _missing(package: str) -> str:

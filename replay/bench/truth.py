@@ -53,7 +53,7 @@ def _beyond(vertices: Floats, point: Floats) -> float:
     return max(0.0, float(np.sum(normals * (point - a), axis=1).max()))
 
 
-def placed(points: Floats, T: Floats) -> Wide:
+def placed(points: Floats, T: Floats | Wide) -> Wide:
     """Return R p + t in extended precision, from the doubles as they are."""
     wide, pose = np.asarray(points).astype(np.longdouble), np.asarray(T).astype(np.longdouble)
     return wide @ pose[:3, :3].T + pose[:3, 3]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.bodies import AABB, SPHERE, Volumes
-from replay.collision.leaf import leaf
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +32,7 @@ _SLACK = 2.0**-44
 """Relative to the lengths that enter a distance of spheres: far above their rounding."""
 
 
-@leaf
+@leaf_kernel
 def spread(poses: Floats) -> tuple[float, float]:
     """Return how far (n, 4, 4) poses are from the middle one: max |t_f - t_m| [m] and max |R_f - R_m| [-]."""
     n = len(poses)
@@ -48,7 +48,7 @@ def spread(poses: Floats) -> tuple[float, float]:
     return math.sqrt(shift), math.sqrt(turn)
 
 
-@leaf
+@leaf_kernel
 def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
     """Return a lower bound on the distance [m] of two bodies, from their spheres, b's link at pose (4, 4) in a's."""
     c, o = volumes.center[b], volumes.center[a]
@@ -61,7 +61,7 @@ def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
     return gap
 
 
-@leaf
+@leaf_kernel
 def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, scratch: Floats) -> bool:
     """Return whether two bodies' volumes meet; errs only towards meeting.
 
@@ -100,7 +100,7 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
     return aabbs_meet(center_a, half_a, center_b, half_b, scratch[:4])
 
 
-@leaf
+@leaf_kernel
 def sieve(
     volumes: Volumes,
     pairs: Integers,
@@ -154,7 +154,7 @@ def sieve(
                 counts[BY_VOLUME] += 1
 
 
-@leaf
+@leaf_kernel
 def _same(a: Floats, b: Floats) -> bool:
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 
@@ -35,4 +36,25 @@ class CollisionColumns:
     level: Bytes
     clearance: Floats
     evaluated: Flags
+    undecided: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionEntries:
+    """Collision results of n frames without the clear ones: k entries, by frame, then by pair.
+
+    Every pair and frame that has no entry is clear, without a clearance.
+
+    Attributes:
+        frame: (k,) frame within the block.
+        bodies: (k, 2) the pair's two bodies, in the pair's order.
+        level: (k,) uint8, see `Level`; clear where only the clearance is of interest.
+        clearance: (k,) [m], distance between the shapes; 0 in contact, NaN where not evaluated.
+        undecided: (k,) bool, see `CollisionColumns`.
+    """
+
+    frame: Integers
+    bodies: Integers
+    level: Bytes
+    clearance: Floats
     undecided: Flags

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision import double_double as dd
-from replay.collision.leaf import leaf
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
 
 
-@leaf
+@leaf_kernel
 def corner(points: Floats, i: int) -> dd.Vector:
     """Return point i of points (4, 3, 2) as a vector of double-doubles."""
     return (
@@ -35,7 +35,7 @@ def corner(points: Floats, i: int) -> dd.Vector:
     )
 
 
-@leaf
+@leaf_kernel
 def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
     """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
 
@@ -107,7 +107,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
     return False, best_point, best
 
 
-@leaf
+@leaf_kernel
 def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     """Return whether the origin is inside the tetrahedron beyond the rounding error of 2^-100; if so, its weights."""
     p, q, r, s = corner(points, 0), corner(points, 1), corner(points, 2), corner(points, 3)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from replay.collision import double_double as dd
 from replay.collision import exact_simplex
-from replay.collision.leaf import leaf
 from replay.collision.support import Sets
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -63,7 +63,7 @@ class Workspace(NamedTuple):
     precise: Floats  # (4, 3, 2)
 
 
-@leaf
+@leaf_kernel
 def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[float, float, float]:
     """Return B's vertex i in A's frame, rounded."""
     x, y, z = b.vertices[i, 0], b.vertices[i, 1], b.vertices[i, 2]
@@ -74,7 +74,7 @@ def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[floa
     )
 
 
-@leaf
+@leaf_kernel
 def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) -> int:
     """Drop the points (4, 3) of weight 0 from a simplex of n, in place; return how many remain."""
     kept = 0
@@ -89,7 +89,7 @@ def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) 
     return kept
 
 
-@leaf
+@leaf_kernel
 def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work: Workspace) -> None:
     """Write the points of A and B that the simplex and its weights stand for, in A's frame."""
     result = work.result
@@ -108,7 +108,7 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
         result[POINT_B + 2] += weight * z
 
 
-@leaf
+@leaf_kernel
 def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: Floats, translation: Floats) -> None:
     x, y, z = mapped(b, j, rotation, translation)
     points[k, 0, 0], points[k, 0, 1] = dd.two_sum(a.vertices[i, 0], -x)
@@ -116,7 +116,7 @@ def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: F
     points[k, 2, 0], points[k, 2, 1] = dd.two_sum(a.vertices[i, 2], -z)
 
 
-@leaf
+@leaf_kernel
 def _farthest(
     sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, margin: float
 ) -> int:
@@ -142,7 +142,7 @@ def _farthest(
     return best
 
 
-@leaf
+@leaf_kernel
 def refine(
     a: Sets,
     set_a: int,

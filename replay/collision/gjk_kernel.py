@@ -42,8 +42,8 @@ from replay.collision.gjk_exact import (
     refine,
     write_witness,
 )
-from replay.collision.leaf import leaf
 from replay.collision.support import Sets, farthest
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def workspace() -> Workspace:
     return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
 
 
-@leaf
+@leaf_kernel
 def query(
     a: Sets,
     set_a: int,
@@ -159,7 +159,7 @@ def query(
     return refine(a, set_a, b, set_b, rotation, translation, size, cutoff, work)
 
 
-@leaf
+@leaf_kernel
 def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
     """Return the distance from the origin of the point of the simplex that the weights stand for."""
     x, y, z = 0.0, 0.0, 0.0
@@ -170,7 +170,7 @@ def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-@leaf
+@leaf_kernel
 def _nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[int, float, float, float]:
     """Return (OUTSIDE | INSIDE | UNSURE, x, y, z): the simplex's point nearest to the origin, its weights written."""
     place = faces.OUTSIDE

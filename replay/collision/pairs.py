@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
+import numpy as np
+from numpy.typing import NDArray
+
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
-from replay.kinematics.linkage import Linkage
+from replay.kinematics.linkage import JointType, Linkage
+
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+MOST_PAIRS = 500_000
+"""Most pairs that are listed, those of 1 000 bodies: results hold a column for each, 11 bytes a frame, which is 1.4 GB
+for a block of 256 frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +75,74 @@ class PairPlan:
     unmatched: tuple[DisabledPair, ...]
 
 
+class PairRules:
+    """Which pairs of bodies are tested, as a rule that is asked instead of a list: all pairs of a very large scene.
+
+    Two bodies are tested unless they are on one link, on links joined by a joint, or disabled.
+
+    Args:
+        bodies: all bodies.
+        linkage: whose links they are on.
+        disabled: pairs left out.
+
+    Raises:
+        InvalidValue: two bodies of one name.
+    """
+
+    def __init__(
+        self, bodies: Sequence[CollisionBody], linkage: Linkage, *, disabled: Sequence[DisabledPair] = ()
+    ) -> None:
+        self.names = [body.name for body in bodies]
+        if len(set(self.names)) != len(self.names):
+            raise InvalidValue("bodies", sorted(self.names), "body names must be unique")
+        self.disabled = tuple(disabled)
+        self.order = np.array(sorted(range(len(bodies)), key=self.names.__getitem__), dtype=np.int64)
+        self._rank = np.argsort(self.order)
+        self._link = np.array([body.link for body in bodies], dtype=np.int64)
+        self._parent = linkage.parents
+        self._rigid = _rigid_parts(linkage)
+        self._rules = [(_matching(rule.a, bodies, linkage), _matching(rule.b, bodies, linkage)) for rule in disabled]
+
+    def tested(self, a: Integers | int, b: Integers) -> Flags:
+        """Return which of the pairs of bodies a, b (broadcast) are tested."""
+        result = self._apart(a, b) & ~self._joined(a, b)
+        for x, y in self._rules:
+            result &= ~((x[a] & y[b]) | (y[a] & x[b]))
+        return result
+
+    def static(self, a: Integers | int, b: Integers) -> Flags:
+        """Return which pairs no joint can move relative to each other."""
+        found: Flags = self._rigid[self._link[a]] == self._rigid[self._link[b]]
+        return found
+
+    def by_name(self, pairs: Integers) -> Integers:
+        """Return pairs of bodies (k, 2), each with the body first whose name comes first."""
+        turned = self._rank[pairs[:, 0]] > self._rank[pairs[:, 1]]
+        return np.where(turned[:, None], pairs[:, ::-1], pairs)
+
+    def count(self) -> int:
+        """Return how many pairs are tested."""
+        return sum(int(self.tested(a, self.order[k + 1 :]).sum()) for k, a in enumerate(self.order))
+
+    def unmatched(self) -> tuple[DisabledPair, ...]:
+        """Return the disabled pairs that match no two bodies on different links."""
+        missed = []
+        for rule, (x, y) in zip(self.disabled, self._rules, strict=True):
+            links_x, links_y = set(self._link[x].tolist()), set(self._link[y].tolist())
+            if not links_x or not links_y or (links_x == links_y and len(links_x) == 1):
+                missed.append(rule)
+        return tuple(missed)
+
+    def _apart(self, a: Integers | int, b: Integers) -> Flags:
+        result: Flags = self._link[a] != self._link[b]
+        return result
+
+    def _joined(self, a: Integers | int, b: Integers) -> Flags:
+        x, y = self._link[a], self._link[b]
+        result: Flags = (self._parent[x] == y) | (self._parent[y] == x)
+        return result
+
+
 def plan_pairs(
     bodies: Sequence[CollisionBody], linkage: Linkage, *, disabled: Sequence[DisabledPair] = ()
 ) -> tuple[Pair, ...]:
@@ -74,39 +151,47 @@ def plan_pairs(
     Every two shapes are a pair unless they are on one link, on links joined by a joint, or disabled.
 
     Raises:
-        InvalidValue: two bodies of one name.
+        InvalidValue: two bodies of one name, or more than MOST_PAIRS pairs.
     """
     return plan(bodies, linkage, disabled=disabled).pairs
 
 
 def plan(bodies: Sequence[CollisionBody], linkage: Linkage, *, disabled: Sequence[DisabledPair] = ()) -> PairPlan:
     """Return the pairs to test and the disabled pairs that match nothing; see `plan_pairs`."""
-    names = [body.name for body in bodies]
-    if len(set(names)) != len(names):
-        raise InvalidValue("bodies", sorted(names), "body names must be unique")
-    rules = [(_matching(rule.a, bodies, linkage), _matching(rule.b, bodies, linkage)) for rule in disabled]
-    reached: set[int] = set()
-    static: dict[tuple[int, int], bool | None] = {}  # None: adjacent
-    pairs = []
-    for a, b in itertools.combinations(sorted(range(len(bodies)), key=names.__getitem__), 2):
-        links = (bodies[a].link, bodies[b].link)
-        if links[0] == links[1]:
-            continue
-        matching = [k for k, (x, y) in enumerate(rules) if (a in x and b in y) or (b in x and a in y)]
-        reached.update(matching)
-        if links not in static:
-            static[links] = None if linkage.are_adjacent(*links) else not linkage.moves_between(*links)
-        fixed = static[links]
-        if not matching and fixed is not None:
-            pairs.append(Pair(f"{names[a]}|{names[b]}", a, b, fixed))
-    unmatched = tuple(rule for k, rule in enumerate(disabled) if k not in reached)
-    return PairPlan(tuple(sorted(pairs, key=lambda pair: pair.name)), unmatched)
+    rules = PairRules(bodies, linkage, disabled=disabled)
+    count = rules.count()
+    if count > MOST_PAIRS:
+        reason = (
+            f"results are kept for every pair and frame, at most {MOST_PAIRS} pairs: disable pairs that cannot meet, "
+            "put shapes that move together on one link, or split the scene; "
+            "`CollisionPipeline.contacts` with `PairRules` lists what is near in scenes of any size"
+        )
+        raise InvalidValue("pairs", count, reason)
+    names, pairs = rules.names, []
+    for k, a in enumerate(rules.order.tolist()):
+        others = rules.order[k + 1 :]
+        others = others[rules.tested(a, others)]
+        fixed = rules.static(a, others)
+        pairs += [
+            Pair(f"{names[a]}|{names[b]}", a, b, is_fixed)
+            for b, is_fixed in zip(others.tolist(), fixed.tolist(), strict=True)
+        ]
+    return PairPlan(tuple(sorted(pairs, key=lambda pair: pair.name)), rules.unmatched())
 
 
-def _matching(pattern: str, bodies: Sequence[CollisionBody], linkage: Linkage) -> set[int]:
-    """Return the bodies whose name or whose link's name fits the glob."""
-    return {
-        k
-        for k, body in enumerate(bodies)
-        if fnmatchcase(body.name, pattern) or fnmatchcase(linkage.link_names[body.link], pattern)
-    }
+def _matching(pattern: str, bodies: Sequence[CollisionBody], linkage: Linkage) -> Flags:
+    """Return which bodies' names, or whose links' names, fit the glob."""
+    links = {body.link for body in bodies}
+    fitting = {link for link in links if fnmatchcase(linkage.link_names[link], pattern)}
+    return np.array([body.link in fitting or fnmatchcase(body.name, pattern) for body in bodies], dtype=bool)
+
+
+def _rigid_parts(linkage: Linkage) -> Integers:
+    """Return for each link the link (-1: the world) that it is fixed to, over any number of fixed joints."""
+    result = np.arange(len(linkage.links), dtype=np.int64)
+    for link in range(len(linkage.links)):
+        part = link
+        while part >= 0 and linkage.links[part].joint.type is JointType.FIXED:
+            part = int(linkage.parents[part])
+        result[link] = part
+    return result

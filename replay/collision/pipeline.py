@@ -1,20 +1,28 @@
-"""From link poses to levels and clearances of all pairs, a block of frames at a time."""
+"""From link poses to levels and clearances of all pairs, a block of frames at a time.
+
+A block's candidates are all pairs where these are few, else the pairs that a tree over all bodies finds
+(`candidates.near_pairs`). They are worked off in batches: relative poses, `broad.sieve`, narrow phase. Which way a
+candidate was found does not show in the results.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import broad, narrow, traversal
+from replay.collision import broad, narrow
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
-from replay.collision.columns import CollisionColumns
-from replay.collision.pairs import CollisionBody, Pair
+from replay.collision.candidates import near_pairs
+from replay.collision.columns import CollisionColumns, CollisionEntries
+from replay.collision.counters import Counters
+from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.relative import RelativePoses
+from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import Linkage, LinkPoses
 
@@ -24,46 +32,11 @@ Integers = NDArray[np.int64]
 LINK_PAIRS_AT_ONCE = 512
 """Relative poses held at a time: 512 link pairs of 256 frames are 16 MiB."""
 
+PAIRS_AT_ONCE = 16_384
+"""Pairs worked off at a time: of 256 frames, 50 MiB."""
 
-@dataclass
-class Counters:
-    """What a pipeline did since it was made; pair-frames unless said otherwise.
-
-    Attributes:
-        pairs: pairs planned.
-        static_pairs: of those, pairs that cannot move relative to each other.
-        pair_frames: asked for.
-        static: answered from the one evaluation of a static pair.
-        pruned_by_block: ruled out by the swept spheres of a block.
-        pruned_by_sphere: ruled out by bounding spheres in a frame.
-        pruned_by_volume: ruled out by the bounding volumes in a frame.
-        repeated: answered from the frame before, the pose being the same.
-        narrow: looked at by the narrow phase.
-        boxes: pairs of tree boxes bounded.
-        gjk_queries: pairs of convex sets decided (for `fcl`, calls of the library).
-        gjk_iterations: their iterations.
-        gjk_exact: queries that doubles could not decide and double-doubles did.
-        contacts: at level contact.
-        contained: contacts of a body wholly inside another.
-        undecided: at level contact because GJK reached its accuracy limit.
-    """
-
-    pairs: int = 0
-    static_pairs: int = 0
-    pair_frames: int = 0
-    static: int = 0
-    pruned_by_block: int = 0
-    pruned_by_sphere: int = 0
-    pruned_by_volume: int = 0
-    repeated: int = 0
-    narrow: int = 0
-    boxes: int = 0
-    gjk_queries: int = 0
-    gjk_iterations: int = 0
-    gjk_exact: int = 0
-    contacts: int = 0
-    contained: int = 0
-    undecided: int = 0
+FEW_PAIRS = 512
+"""Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
 
 
 class NarrowPhase(Protocol):
@@ -88,23 +61,26 @@ class CollisionPipeline:
 
     Args:
         bodies: shapes in their links' frames.
-        pairs: pairs to test, see `pairs.plan_pairs`; the columns' order.
+        pairs: pairs to test, see `pairs.plan_pairs`: the columns' order; or the rules they follow, for scenes of so
+            many bodies that their pairs cannot be listed.
         linkage: whose links the bodies are on.
         bounds: bounding volumes, which define the level `bounds`.
         narrowphase: "gjk" (this package's own) or "fcl" (python-fcl).
         pieces: how concave bodies are collided, see `geometry.convex_sets`.
-        clearance: "never"; "near": exact up to `margin`; "always".
+        clearance: "never"; "near": exact up to `margin`; "always": of every pair in every frame, however far, which
+            costs n^2 of n bodies and needs listed pairs.
         margin: [m], for "near".
 
     Raises:
-        InvalidValue: an unknown option, or a margin that is not finite and positive.
+        InvalidValue: an unknown option, a margin that is not finite and positive, a pair that is listed twice, or
+            "always" with rules.
         MissingPackageError: "fcl" without python-fcl.
     """
 
     def __init__(
         self,
         bodies: Sequence[CollisionBody],
-        pairs: Sequence[Pair],
+        pairs: Sequence[Pair] | PairRules,
         linkage: Linkage,
         *,
         bounds: Bounds = "obb",
@@ -119,119 +95,177 @@ class CollisionPipeline:
             raise InvalidValue("narrowphase", narrowphase, "must be one of gjk, fcl")
         if clearance == "near" and not 0.0 < margin < math.inf:
             raise InvalidValue("margin", margin, "must be finite and positive [m]")
-        self.pairs = tuple(pairs)
-        self.counters = Counters(pairs=len(self.pairs), static_pairs=sum(pair.static for pair in self.pairs))
+        if clearance == "always" and isinstance(pairs, PairRules):
+            raise InvalidValue("clearance", clearance, "needs listed pairs: with rules, write never or near")
         self._limit = {"never": 0.0, "near": float(margin), "always": math.inf}[clearance]
-        self._uses_world = bounds == "aabb"
-        used = sorted({k for pair in self.pairs for k in (pair.a, pair.b)})
-        place = {body: k for k, body in enumerate(used)}
-        chosen = [bodies[k] for k in used]
-        self._links = [body.link for body in chosen]
-        self._rows = np.array([[place[pair.a], place[pair.b]] for pair in self.pairs], dtype=np.int64).reshape(-1, 2)
-        self._static = np.array([pair.static for pair in self.pairs], dtype=bool)
-        if bounds == "aabb":  # their boxes turn with their common base
-            self._static[:] = False
         self._linkage = linkage
-        self._moving = self._grouped(np.flatnonzero(~self._static))
-        self._fixed = self._grouped(np.flatnonzero(self._static))
-        self._static_columns: CollisionColumns | None = None
-        self._decide: NarrowPhase | None = None
+        self._uses_world = bounds == "aabb"
+        # boxes along the world's axes turn with their links' common base: such pairs are evaluated in every frame
+        self._pairs = Ruled(pairs) if isinstance(pairs, PairRules) else Listed(pairs, turning=self._uses_world)
+        self.counters = Counters(pairs=self._pairs.count, static_pairs=self._pairs.static_count)
+        self._used = self._pairs.bodies()
+        chosen = [bodies[k] for k in self._used]
+        self._links = np.array([body.link for body in chosen], dtype=np.int64)
+        self._place = np.full(len(bodies), -1, dtype=np.int64)
+        self._place[self._used] = np.arange(len(chosen))
+        self._all: Selected | None = None  # what every block looks at, where that is all pairs
+        if isinstance(self._pairs, Listed) and (self._pairs.count <= FEW_PAIRS or clearance == "always"):
+            self._all = self._pairs.all()
+            self._always = self._batches(self._all.moving())
+        self._static: list[_Found] | None = None
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
             self._decide = _engine(narrowphase, chosen, arrays)
 
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The listed pairs, in the columns' order; empty if rules were given."""
+        return self._pairs.listed
+
     def run(self, poses: LinkPoses) -> CollisionColumns:
         """Return the columns of a block of n frames; they depend on no other block.
 
         Raises:
-            InvalidValue: a pose is not finite.
+            InvalidValue: a pose is not finite, or the pairs were given as rules: they have no columns.
 
         Accuracy: a clearance is right to 1e-12 of itself plus 1e-14 of the bodies' reach and offset
         (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does.
         """
-        n, count = len(poses.local), len(self.pairs)
+        if isinstance(self._pairs, Ruled):
+            raise InvalidValue("pairs", "rules", "columns need listed pairs; ask `contacts` instead")
+        shape = (len(poses.local), self._pairs.count)
+        columns = CollisionColumns(
+            level=np.zeros(shape, dtype=np.uint8),
+            clearance=np.full(shape, np.nan),
+            evaluated=np.zeros(shape, dtype=bool),
+            undecided=np.zeros(shape, dtype=bool),
+        )
+        for found in self._evaluate(poses):
+            columns.level[:, found.columns] = found.level
+            columns.clearance[:, found.columns] = found.clearance
+            columns.evaluated[:, found.columns] = ~np.isnan(found.clearance)
+            columns.undecided[:, found.columns] = found.undecided
+        return columns
+
+    def contacts(self, poses: LinkPoses) -> CollisionEntries:
+        """Return what `run` does without the clear pairs and frames: memory and time grow with those that are near.
+
+        Raises:
+            InvalidValue: a pose is not finite.
+
+        Accuracy: as `run`.
+        """
+        n = len(poses.local)
+        frame, bodies = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)]
+        level, clearance = [np.zeros(0, dtype=np.uint8)], [np.zeros(0)]
+        undecided = [np.zeros(0, dtype=bool)]
+        for found in self._evaluate(poses):
+            near = np.broadcast_to((found.level > 0) | ~np.isnan(found.clearance), (n, found.level.shape[1]))
+            f, p = np.nonzero(near)
+            source = np.minimum(f, len(found.level) - 1)
+            frame.append(f)
+            bodies.append(self._used[found.rows[p]])
+            level.append(found.level[source, p])
+            clearance.append(found.clearance[source, p])
+            undecided.append(found.undecided[source, p])
+        frames, pairs = np.concatenate(frame), np.concatenate(bodies)
+        order = np.lexsort((pairs[:, 1], pairs[:, 0], frames))
+        return CollisionEntries(
+            frame=frames[order],
+            bodies=pairs[order],
+            level=np.concatenate(level)[order],
+            clearance=np.concatenate(clearance)[order],
+            undecided=np.concatenate(undecided)[order],
+        )
+
+    def _evaluate(self, poses: LinkPoses) -> Iterator[_Found]:
+        """Yield what is known of all pairs that may be near in a block, of those that cannot move as one frame."""
+        n = len(poses.local)
         if not np.isfinite(poses.local).all():
             frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
             place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
             raise InvalidValue(place, poses.local[frame, link].tolist(), "link poses must be finite")
-        self.counters.pair_frames += n * count
-        columns = _empty(n, count)
-        if n == 0:
-            return columns
-        if self._fixed:
-            if self._static_columns is None:
-                self._static_columns = _empty(1, count)
-                self._evaluate(self._fixed, poses.slice(0, 1), self._static_columns)
-            self.counters.static += n * self.counters.static_pairs
-            _copy(self._static_columns, columns, np.flatnonzero(self._static))
-        self._evaluate(self._moving, poses, columns)
-        return columns
+        self.counters.pair_frames += n * self._pairs.count
+        if n == 0 or self._pairs.count == 0:
+            return
+        if self._static is None:
+            first = poses.slice(0, 1)
+            self._static = []
+            if self._pairs.static_count:
+                fixed = self._candidates(first).fixed()
+                self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
+                self._static = [self._work(batch, first) for batch in self._batches(fixed)]
+        self.counters.static += n * self._pairs.static_count
+        yield from self._static
+        if self._all is None:
+            moving = self._candidates(poses).moving()
+            self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
+        for batch in self._always if self._all is not None else self._batches(moving):
+            yield self._work(batch, poses)
 
-    def _evaluate(self, groups: Sequence[_Group], poses: LinkPoses, columns: CollisionColumns) -> None:
-        for group in groups:
-            relative = group.relative.of(poses.local)
-            turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
-            if self._uses_world:
-                turns = np.ascontiguousarray(np.moveaxis(poses.world[:, group.bases, :3, :3], 1, 0))
-            self._run_kernels(group, relative, turns, columns)
+    def _candidates(self, poses: LinkPoses) -> Selected:
+        if self._all is not None:
+            return self._all
+        return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, self._limit)])
 
-    def _run_kernels(self, group: _Group, relative: Floats, turns: Floats, columns: CollisionColumns) -> None:
-        assert self._decide is not None
-        rows, n, count = group.rows, relative.shape[1], len(group.rows)
-        part = _empty(n, count)
-        task = np.zeros((n, count), dtype=np.uint8)
-        sieved = np.zeros(broad.COUNTS, dtype=np.int64)
-        decided = np.zeros(narrow.COUNTS, dtype=np.int64)
+    def _work(self, batch: _Batch, poses: LinkPoses) -> _Found:
+        relative = batch.relative.of(poses.local)
+        turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
+        if self._uses_world:
+            turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
+        shape = relative.shape[1], len(batch.rows)
+        level, task = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.uint8)
+        clearance, undecided = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+        sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
-        broad.sieve(self._volumes, rows, relative, turns, self._limit, part.level, task, sieved, spreads, scratch)
-        self._decide(rows, relative, self._limit, task, part.level, part.clearance, part.undecided, decided)
-        part.evaluated[:] = ~np.isnan(part.clearance)
-        for name in ("level", "clearance", "evaluated", "undecided"):
-            getattr(columns, name)[:, group.pairs] = getattr(part, name)
-        self._count(sieved.tolist(), decided.tolist())
+        broad.sieve(self._volumes, batch.rows, relative, turns, self._limit, level, task, sieved, spreads, scratch)
+        self._decide(batch.rows, relative, self._limit, task, level, clearance, undecided, decided)
+        self.counters.add(sieved.tolist(), decided.tolist())
+        return _Found(batch.columns, batch.rows[:, :2], level, clearance, undecided)
 
-    def _grouped(self, chosen: Integers) -> list[_Group]:
-        """Return pairs in groups that share link pairs, at most LINK_PAIRS_AT_ONCE of these a group."""
-        by_links: dict[tuple[int, int], list[int]] = {}
-        for pair in chosen.tolist():
-            a, b = self._rows[pair]
-            by_links.setdefault((self._links[a], self._links[b]), []).append(pair)
-        groups, links = [], list(by_links)
-        for begin in range(0, len(links), LINK_PAIRS_AT_ONCE):
-            part = links[begin : begin + LINK_PAIRS_AT_ONCE]
-            bases = sorted({a for a, _ in part})
-            base_row = {link: k if self._uses_world else 0 for k, link in enumerate(bases)}
-            entries = sorted((pair, q, base_row[key[0]]) for q, key in enumerate(part) for pair in by_links[key])
-            rows = np.array([[*self._rows[pair], q, base] for pair, q, base in entries], dtype=np.int64)
-            pairs = np.array([pair for pair, _, _ in entries], dtype=np.int64)
-            groups.append(_Group(pairs, rows, RelativePoses(self._linkage, part), bases))
-        return groups
-
-    def _count(self, sieved: list[int], decided: list[int]) -> None:
-        counters = self.counters
-        counters.pruned_by_block += sieved[broad.BY_BLOCK]
-        counters.pruned_by_sphere += sieved[broad.BY_SPHERE]
-        counters.pruned_by_volume += sieved[broad.BY_VOLUME]
-        counters.repeated += sieved[broad.BY_REPEAT]
-        counters.boxes += decided[traversal.BOXES]
-        counters.gjk_queries += decided[traversal.QUERIES]
-        counters.gjk_iterations += decided[traversal.ITERATIONS]
-        counters.gjk_exact += decided[traversal.IN_DOUBLE_DOUBLE]
-        counters.narrow += decided[narrow.RUNS]
-        counters.contained += decided[narrow.SEEN_INSIDE]
-        counters.contacts += decided[narrow.CONTACTS]
-        counters.undecided += decided[narrow.UNDECIDEDS]
+    def _batches(self, chosen: Selected) -> list[_Batch]:
+        """Return pairs in batches that share link pairs."""
+        rows = self._place[chosen.rows]
+        links = self._links[rows]
+        order = np.lexsort((links[:, 1], links[:, 0]))
+        rows, links, columns = rows[order], links[order], chosen.columns[order]
+        starts = np.ones(len(rows), dtype=bool)
+        starts[1:] = (links[1:] != links[:-1]).any(axis=1)
+        number = np.cumsum(starts) - 1  # of each pair's link pair
+        batches, begin = [], 0
+        while begin < len(rows):
+            end = int(np.searchsorted(number, number[begin] + LINK_PAIRS_AT_ONCE))
+            end = min(end, begin + PAIRS_AT_ONCE)
+            part = slice(begin, end)
+            _, first, q = np.unique(number[part], return_index=True, return_inverse=True)
+            bases, base = np.unique(links[part, 0], return_inverse=True)
+            table = np.stack([rows[part, 0], rows[part, 1], q, base if self._uses_world else 0 * base], axis=1)
+            ways = RelativePoses(self._linkage, links[part][first])
+            batches.append(_Batch(columns[part], table, ways, bases))
+            begin = end
+        return batches
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class _Batch:
     """Pairs evaluated together: `rows` for `broad.sieve`, their relative poses, the links of their first bodies."""
 
-    pairs: Integers
+    columns: Integers
     rows: Integers
     relative: RelativePoses
-    bases: list[int]
+    bases: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Results of a batch's pairs: (n, c) arrays, or (1, c) for pairs that cannot move; `rows` are their bodies."""
+
+    columns: Integers
+    rows: Integers
+    level: NDArray[np.uint8]
+    clearance: Floats
+    undecided: NDArray[np.bool_]
 
 
 def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies) -> NarrowPhase:
@@ -253,17 +287,3 @@ def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies) -> Narro
         narrow.decide(arrays, pairs, poses, limit, task, level, clearance, undecided, counts)
 
     return decide
-
-
-def _empty(n: int, count: int) -> CollisionColumns:
-    return CollisionColumns(
-        level=np.zeros((n, count), dtype=np.uint8),
-        clearance=np.full((n, count), np.nan),
-        evaluated=np.zeros((n, count), dtype=bool),
-        undecided=np.zeros((n, count), dtype=bool),
-    )
-
-
-def _copy(source: CollisionColumns, columns: CollisionColumns, target: Integers) -> None:
-    for name in ("level", "clearance", "evaluated", "undecided"):
-        getattr(columns, name)[:, target] = getattr(source, name)[0, target]

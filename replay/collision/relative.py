@@ -6,30 +6,52 @@ way k is its parent's way times the link's own pose. A pair then costs one inver
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.leaf import leaf
 from replay.kinematics.linkage import Linkage
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
 class RelativePoses:
-    """Link pairs (a, b) of a linkage, and which ways their relative poses are made of."""
+    """Link pairs (Q, 2) of a linkage, and which ways their relative poses are made of.
 
-    def __init__(self, linkage: Linkage, links: Sequence[tuple[int, int]]) -> None:
-        ways: list[tuple[int, int]] = []  # (parent's way or -1, link)
-        rows: dict[tuple[int, ...], int] = {}
-        pairs = []
-        for a, b in links:
-            both = linkage.chains_to_common_ancestor(a, b)
-            pairs.append([self._row(tuple(reversed(up)), ways, rows) for up in both])
-        self._ways = np.array(ways, dtype=np.int64).reshape(-1, 2)
-        self._pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    Link l at depth d of its tree has the path of links p_0 (the root) .. p_d = l. Two links share the first m links of
+    their paths; the way of each is the rest of its path, named by (m, l), none if it is empty. The way before it,
+    (m, p_d-1), is that of its parent.
+    """
+
+    def __init__(self, linkage: Linkage, links: Integers) -> None:
+        links = np.asarray(links, dtype=np.int64).reshape(-1, 2)
+        used, place = np.unique(links, return_inverse=True)
+        place = place.reshape(links.shape)
+        paths = [linkage.ancestors(int(link))[::-1] for link in used]
+        depth = max(map(len, paths), default=0)
+        table = np.array([path + [-1] * (depth - len(path)) for path in paths], dtype=np.int64).reshape(-1, depth)
+        first, second = table[place[:, 0]], table[place[:, 1]]
+        shared = np.cumprod((first == second) & (first >= 0), axis=1).sum(axis=1)
+        length = np.array([len(path) for path in paths], dtype=np.int64)
+        empty = length[place] == shared[:, None]
+        count = len(linkage.links)
+        wanted = np.where(empty, -1, shared[:, None] * count + links)
+        # every way and those before it, parents first: by the number of links above the way's last one
+        above = np.full(count, -1, dtype=np.int64)
+        for path in paths:
+            above[path] = np.arange(len(path))
+        keys = np.unique(wanted[~empty])
+        fresh = keys
+        while len(fresh):
+            longer = above[fresh % count] > fresh // count
+            fresh = np.setdiff1d(fresh[longer] - fresh[longer] % count + linkage.parents[fresh[longer] % count], keys)
+            keys = np.union1d(keys, fresh)
+        keys = keys[np.argsort(above[keys % count], kind="stable")]
+        order = np.argsort(keys)
+        parents = np.where(above[keys % count] > keys // count, keys - keys % count + linkage.parents[keys % count], -1)
+        self._ways = np.stack([_rows(parents, keys, order), keys % count], axis=1)
+        self._pairs = np.ascontiguousarray(_rows(wanted, keys, order))
 
     def of(self, local: Floats) -> Floats:
         """Return T_a_b (Q, n, 4, 4) of the Q link pairs, for link poses local (n, L, 4, 4) in their parents."""
@@ -38,18 +60,16 @@ class RelativePoses:
         _relative(np.ascontiguousarray(local), self._ways, self._pairs, table, np.identity(4), np.identity(4), result)
         return result
 
-    def _row(self, down: tuple[int, ...], ways: list[tuple[int, int]], rows: dict[tuple[int, ...], int]) -> int:
-        """Return the row of the way down these links, -1 for none, adding what is missing."""
-        if not down:
-            return -1
-        if down not in rows:
-            parent = self._row(down[:-1], ways, rows)
-            rows[down] = len(ways)
-            ways.append((parent, down[-1]))
-        return rows[down]
+
+def _rows(wanted: Integers, keys: Integers, order: Integers) -> Integers:
+    """Return the row of each wanted key in `keys`, which `order` sorts; -1 stays."""
+    if len(keys) == 0:
+        return wanted
+    found: Integers = order[np.searchsorted(keys[order], np.maximum(wanted, keys.min()))]
+    return np.where(wanted < 0, -1, found)
 
 
-@leaf
+@leaf_kernel
 def _relative(
     local: Floats, ways: Integers, pairs: Integers, table: Floats, identity: Floats, inverse: Floats, result: Floats
 ) -> None:
@@ -70,7 +90,7 @@ def _relative(
             _compose(inverse, identity if b < 0 else table[b, f], result[q, f])
 
 
-@leaf
+@leaf_kernel
 def _compose(first: Floats, second: Floats, product: Floats) -> None:
     """Write first second, rigid transforms (4, 4), in the order of operations of `transforms.compose`."""
     for i in range(3):

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from replay.collision.leaf import leaf
+from replay.numerics.jit import leaf_kernel
 
 Point = tuple[float, float, float]
 Near2 = tuple[Point, float, float]
@@ -34,25 +34,25 @@ DETERMINANT_ERROR = 64.0 * 2.0**-53
 """Bound of the rounding error of D_ijk over size max|p|^2; each product, each sum and each p_i contributes."""
 
 
-@leaf
+@leaf_kernel
 def dot(u: Point, v: Point) -> float:
     """Return the inner product."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@leaf
+@leaf_kernel
 def cross(u: Point, v: Point) -> Point:
     """Return the vector product."""
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
-@leaf
+@leaf_kernel
 def difference(u: Point, v: Point) -> Point:
     """Return u - v."""
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
-@leaf
+@leaf_kernel
 def nearest_on_segment(a: Point, b: Point) -> Near2:
     """Return the point of the segment ab nearest to the origin, and the weights of a and b."""
     e = difference(b, a)
@@ -67,7 +67,7 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
     return (v[0] / square, v[1] / square, v[2] / square), 1.0 - t, t
 
 
-@leaf
+@leaf_kernel
 def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
     """Return the point of the triangle abc nearest to the origin, and the weights of a, b and c."""
     u, v = difference(b, a), difference(c, a)
@@ -104,7 +104,7 @@ def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
     return (n[0] * distance, n[1] * distance, n[2] * distance), 1.0 - weight_b - weight_c, weight_b, weight_c
 
 
-@leaf
+@leaf_kernel
 def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     """Let the three edges of a triangle compete: for one that is degenerate or contradicts itself."""
     point, wa, wb = nearest_on_segment(a, b)
@@ -118,7 +118,7 @@ def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     return point, wa, wb, wc
 
 
-@leaf
+@leaf_kernel
 def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
     """Return (OUTSIDE | INSIDE | UNSURE, point, weights of a, b, c, d).
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.leaf import leaf
+from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -22,7 +22,7 @@ class Sets(NamedTuple):
     neighbors: Integers  # (e,)
 
 
-@leaf
+@leaf_kernel
 def farthest(sets: Sets, k: int, x: float, y: float, z: float, hint: int) -> int:
     """Return the vertex of set k (its row in `vertices`) that is farthest along (x, y, z).
 
@@ -36,7 +36,7 @@ def farthest(sets: Sets, k: int, x: float, y: float, z: float, hint: int) -> int
     return _climb(sets.vertices, sets.neighbors_first, sets.neighbors, begin, start, x, y, z)
 
 
-@leaf
+@leaf_kernel
 def farthest_of_all(vertices: Floats, begin: int, end: int, x: float, y: float, z: float) -> int:
     """Return the row of vertices[begin:end] that is farthest along (x, y, z), the first of equals."""
     best = begin
@@ -49,7 +49,7 @@ def farthest_of_all(vertices: Floats, begin: int, end: int, x: float, y: float, 
     return best
 
 
-@leaf
+@leaf_kernel
 def _climb(
     vertices: Floats,
     neighbors_first: Integers,

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from replay.collision.bodies import Bodies
 from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, LOWER, SEPARATED, STEPS, UNDECIDED, Workspace
 from replay.collision.gjk_kernel import ROUNDING, query
-from replay.collision.leaf import leaf
 from replay.geometry.containment import inside
 from replay.geometry.tree import MAX_DEPTH, Tree
-from replay.numerics.jit import kernel
+from replay.numerics.jit import kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +31,7 @@ BOXES, QUERIES, ITERATIONS, IN_DOUBLE_DOUBLE = range(COUNTS)
 """Rows of the counters: node pairs bounded, GJK queries, their iterations, and queries that needed 106 bits."""
 
 
-@leaf
+@leaf_kernel
 def box_gap(bodies: Bodies, i: int, j: int, rotation: Floats, translation: Floats, slack: float) -> float:
     """Return a lower bound on the distance [m] of node i of body A and node j of body B (global rows), B at (R, t)."""
     ca, wa = bodies.node_center, bodies.node_half
@@ -57,7 +56,7 @@ def box_gap(bodies: Bodies, i: int, j: int, rotation: Floats, translation: Float
     return math.sqrt(max(square, x * x + y * y + z * z)) - slack
 
 
-@leaf
+@leaf_kernel
 def closest(
     bodies: Bodies,
     a: int,
@@ -161,7 +160,7 @@ def closest(
     return SEPARATED, best if found else np.inf
 
 
-@leaf
+@leaf_kernel
 def _larger(half: Floats, i: int, j: int) -> bool:
     larger: bool = half[i, 0] + half[i, 1] + half[i, 2] >= half[j, 0] + half[j, 1] + half[j, 2]
     return larger

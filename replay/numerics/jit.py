@@ -105,3 +105,28 @@ def kernel(function: Function) -> Function:
         return cast(Function, numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function))
     finally:
         settings.CACHE_DIR = previous
+
+
+def leaf_kernel(function: Function) -> Function:
+    """Compile as `kernel` does, without reference counting: for kernels that only use arrays they are given.
+
+    numba counts references to every array that a compiled function is passed or slices, with atomic operations, even
+    where nothing is kept: 5 ns each, 45 of the 50 ns of a support query of a box. A function that allocates nothing
+    needs no counting, since its caller holds the arrays; one that would allocate fails to compile. The results are the
+    same. numba has no public option for this: should its internal one disappear, the function is compiled as usual.
+    """
+    dispatcher = kernel(function)
+    options = getattr(dispatcher, "targetoptions", None)  # None when NUMBA_DISABLE_JIT leaves the function as it is
+    if isinstance(options, dict) and _counting_is_optional():
+        options["_nrt"] = False
+    return dispatcher
+
+
+@lru_cache(maxsize=1)
+def _counting_is_optional() -> bool:
+    """Return whether this numba knows the option of compiling without reference counting."""
+    try:
+        from numba.core.options import DefaultOptions
+    except ImportError:
+        return False
+    return hasattr(DefaultOptions, "_nrt")

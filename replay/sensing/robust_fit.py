@@ -30,6 +30,8 @@ def robust_fit(design: Floats, held: float, y: Floats, divided: bool) -> tuple[F
 
     With residuals r at scale s, psi(r) = r / sqrt(1 + (r/s)^2) is the derivative of soft_l1, and the covariance of an
     M-estimate is  sum psi^2 / (n - p) / mean(psi')^2 (J^T J)^-1.  The scale is taken from the plain least-squares fit.
+    A wrong value is outvoted by the other points only where they say much of the same parameter: at the one point where
+    a curve is steepest no residual gives it away.
 
     Args:
         design: (n, p), columns of size 1, n >= p.

@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 import replay
+from replay.numerics import jit
 
 CALLEE = "from replay.numerics.jit import kernel\n\n\n@kernel\ndef inner(x):\n    return x + {}\n"
 CALLER = (
@@ -70,3 +73,30 @@ def test_an_install_that_cannot_be_written_uses_the_users_cache_folder(package, 
     assert run(package, "outer(1.0); print(c())", **home).startswith(str(tmp_path / "xdg"))
     nowhere = {**home, "XDG_CACHE_HOME": str(blocked), "TMPDIR": str(tmp_path)}
     assert run(package, "outer(1.0); print(c())", **nowhere).startswith(str(tmp_path))
+
+
+def test_leaf_kernels_compute_what_kernels_do_with_or_without_the_option(monkeypatch):
+    def total(rows):
+        result = 0.0
+        for row in rows:
+            result += row[0] / row[1]
+        return result
+
+    rows = np.random.default_rng(1).normal(size=(50, 2))
+    expected = jit.kernel(total)(rows)
+    leaf = jit.leaf_kernel(total)
+    assert leaf.targetoptions["_nrt"] is False
+    assert leaf(rows) == expected
+    monkeypatch.setattr(jit, "_counting_is_optional", lambda: False)
+    usual = jit.leaf_kernel(total)
+    assert "_nrt" not in usual.targetoptions
+    assert usual(rows) == expected
+
+
+def test_a_leaf_kernel_that_allocates_fails_to_compile():
+    @jit.leaf_kernel
+    def allocates(n):
+        return np.zeros(n).sum()
+
+    with pytest.raises(numba.core.errors.NumbaError):
+        allocates(3)

@@ -1,0 +1,58 @@
+"""The distance benchmark, small."""
+
+import importlib.util
+import math
+
+import numpy as np
+import pytest
+
+from replay.bench import distance
+from replay.bench.cone_truth import nearest_in_cone
+from replay.bench.inputs import box_surface, torus
+from replay.geometry.solid import signed_volume
+
+
+def test_every_method_on_a_small_torus():
+    rows = distance.on_mesh("torus", torus(400), queries=6, counts=(1, 61), rounds=1)
+    found = {row.method: row for row in rows}
+    assert set(found) == {"exact", "thesis", "own, 1 rays", "own, 61 rays", "embree, 1 rays", "embree, 61 rays"}
+    exact = found["exact"]
+    assert exact.wrong == 0
+    assert exact.worst_error <= 1e-13
+    assert found["own, 61 rays"].worst_error > 1e-6
+    assert found["own, 61 rays"].wrong == 0
+
+
+def test_too_near_is_wrong_and_not_seen_is_missed():
+    truth = np.array([1.0, 1.0, 1.0])
+    rays = distance.judge(np.array([1.1, math.inf, 0.9]), truth, exact=False)
+    assert (rays.wrong, rays.missed) == (1, 1)
+    exact = distance.judge(np.array([1.0, math.inf, 1.0 + 1e-6]), truth, exact=True)
+    assert exact.wrong == 2
+    assert distance.judge(np.array([math.nan]), truth[:1], exact=False).failed
+
+
+def test_the_reference_knows_a_plane_a_border_and_an_edge():
+    up = np.array([0.0, 0.0, 1.0])
+    half = math.radians(15.0)
+    square = np.array([[[-9.0, -9.0, 2.0], [9.0, -9.0, 2.0], [0.0, 9.0, 2.0]]])
+    assert nearest_in_cone(square, np.zeros(3), up, 2.0 * half) == 2.0
+    slope = np.array([[[-50.0, -50.0, -48.0], [50.0, -50.0, -48.0], [0.0, 50.0, 52.0]]])  # z = 2 + y
+    border = 2.0 / (math.cos(half) + math.sin(half))
+    assert nearest_in_cone(slope, np.zeros(3), up, 2.0 * half) == pytest.approx(border, rel=1e-15)
+    aside = square + np.array([100.0, 0.0, 0.0])
+    assert nearest_in_cone(aside, np.zeros(3), up, 2.0 * half) == math.inf
+
+
+def test_a_missing_phantom_is_said(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(distance, "_add_growth", lambda *_, **__: None)
+    report = distance.run(quick=True, rounds=1, meshes=("phantom, 26 756 triangles",))
+    (row,) = report.tables["phantom, 26 756 triangles"]
+    assert "pyskindose" in row.note
+    assert [goal.verdict for goal in report.goals] == ["not measured", "not measured"]
+
+
+def test_bodies_are_closed_and_outside_out():
+    assert signed_volume(box_surface((0.6, 0.5, 0.4))) == pytest.approx(0.12)
+    assert signed_volume(torus(20_000)) == pytest.approx(2.0 * math.pi**2 * 0.5 * 0.2**2, rel=1e-2)

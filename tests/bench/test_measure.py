@@ -1,0 +1,89 @@
+"""Timing, verdicts and the report."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from replay.bench.measure import Check, Contender, Goal, absent, compete, exponent, ratio
+from replay.bench.report import Grid, Plot, Report, pareto_front, pareto_plot
+
+
+def contender(name, *, answer=1.0, work=0):
+    def run():
+        return sum(range(work)) * 0.0 + answer
+
+    return Contender(name, run, 10, lambda found: Check(abs(found - 1.0), 10 * int(found != 1.0), 0.0))
+
+
+def test_a_wrong_contender_is_reported_as_failed_never_as_fast():
+    rows = compete("case", [contender("slow", work=100_000), contender("liar", answer=2.0)], rounds=3)
+    slow, liar = rows
+    assert (slow.failed, liar.failed, liar.wrong) == (False, True, 10)
+    assert 0.0 < slow.low <= slow.median <= slow.high
+    assert math.isnan(ratio(rows, "case", "slow", "liar"))
+    report = Report("test", tables={"table": rows}, plots=[pareto_plot("plot", rows, "error")])
+    assert "FAILED: wrong answers" in report.as_text()
+    assert list(report.plots[0].lines) == ["slow"]
+
+
+def test_an_error_that_is_no_number_fails():
+    row = compete("case", [Contender("nan", lambda: None, 1, lambda _: Check(math.nan))], rounds=1)[0]
+    assert row.failed
+
+
+def test_ratio_is_of_medians_and_needs_both():
+    rows = compete("case", [contender("slow", work=200_000), contender("fast")], rounds=3)
+    assert ratio(rows, "case", "slow", "fast") > 1.0
+    assert math.isnan(ratio([rows[0], absent("case", "fast", "not installed")], "case", "slow", "fast"))
+    assert math.isnan(ratio(rows, "another case", "slow", "fast"))
+
+
+@pytest.mark.parametrize(("measured", "verdict"), [(3.0, "met"), (2.9, "missed"), (math.nan, "not measured")])
+def test_goals(measured, verdict):
+    assert Goal("what", ">= 3x", measured, 3.0).verdict == verdict
+
+
+def test_goal_from_above():
+    assert Goal("what", "0", 0.0, 0.0, at_least=False).verdict == "met"
+    assert Goal("what", "0", 1.0, 0.0, at_least=False).verdict == "missed"
+
+
+def test_exponent_of_a_power_law():
+    assert exponent([(n, 3.0 * n**1.5) for n in (10.0, 100.0, 1000.0)]) == pytest.approx(1.5)
+    assert math.isnan(exponent([(1.0, 1.0)]))
+
+
+def test_pareto_front_keeps_what_no_other_beats():
+    points = [(1.0, 5.0), (2.0, 5.0), (3.0, 1.0), (4.0, 2.0), (0.5, 9.0)]
+    assert pareto_front(points) == [(0.5, 9.0), (1.0, 5.0), (3.0, 1.0)]
+
+
+def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
+    rows = [*compete("case", [contender("ours")], rounds=1), absent("case", "peer", "not installed")]
+    report = Report(
+        "test",
+        tables={"table <1>": rows},
+        grids={"grid": Grid([{"a": 1, "b": "x"}])},
+        goals=[Goal("what", ">= 3x", math.nan, 3.0)],
+        plots=[
+            Plot("cost", "n", "s", {"ours": [(1.0, 0.0), (10.0, 1e-3)]}, joined=True, front=True, crossed=[(1.0, 0.0)]),
+            pareto_plot("empty", [], "error"),
+        ],
+        notes=["a note"],
+    )
+    data, page = report.write(tmp_path / "new")
+    found = json.loads(data.read_text())
+    assert set(found) == {"benchmark", "machine", "tables", "grids", "goals", "notes"}
+    ours, peer = found["tables"]["table <1>"]
+    assert ours["median"] > 0.0
+    assert (peer["median"], peer["note"]) == (None, "not installed")
+    assert found["goals"][0]["verdict"] == "not measured"
+    assert "numpy" in found["machine"]["packages"]
+    html = page.read_text()
+    assert "table &lt;1&gt;" in html
+    assert html.count("data:image/png;base64,") == 2
+    assert "http" not in html.replace("http-equiv", "")
+    assert "not installed" in report.as_text()
+    assert np.isfinite(ours["worst_error"])
