@@ -33,7 +33,7 @@ run: setup  ## run every scenario under scenarios/ and say where the recordings 
 	@echo "  $(BIN)/replay info $(RECORDINGS)/carm_head_contact/carm_head_contact.mcap"
 
 regress: setup  ## run every scenario and compare it with its accepted recording; the report is regress/index.html
-	@$(BIN)/replay regress scenarios --baseline $(BASELINES) -o $(NIGHT) || { code=$$?; \
+	@$(BIN)/replay regress scenarios --baseline $(BASELINES) -o $(NIGHT) --timeout 10min || { code=$$?; \
 	  echo "If the new results are right: make accept REASON='why they are'"; exit $$code; }
 
 accept: setup  ## make the results of `make regress` the accepted ones: make accept REASON='why'

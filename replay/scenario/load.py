@@ -16,7 +16,17 @@ from replay.scenario.names import Names
 from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
-from replay.scenario.source import Attached, Folder, Library, Provenance, SourceRule, find, problem_at, resolve_name
+from replay.scenario.source import (
+    Attached,
+    Folder,
+    Library,
+    Provenance,
+    Remembered,
+    SourceRule,
+    find,
+    problem_at,
+    resolve_name,
+)
 from replay.scenario.sweep import Sweep, SweepCase, cases, replaced
 from replay.scenario.yaml_text import parse
 
@@ -99,7 +109,7 @@ class _File:
     """
 
     def __init__(self, library: Library) -> None:
-        self._library = library
+        self._library = library = Remembered(library)
         self._problems: list[Problem] = []
         self._text = Text(library, self._problems)
         root = self._text.read()

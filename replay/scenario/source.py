@@ -187,6 +187,25 @@ class Attached:
         return self._sources[name]
 
 
+class Remembered:
+    """Another library, each of whose files is read once: the cases of a sweep share their meshes in memory."""
+
+    def __init__(self, library: Library) -> None:
+        self.main = library.main
+        self._library = library
+        self._files: dict[str, bytes] = {}
+
+    def shown(self, name: str) -> str:
+        """Return what messages call the file of this name."""
+        return self._library.shown(name)
+
+    def read(self, name: str) -> bytes:
+        """Return the file's bytes; raises SourceRule."""
+        if name not in self._files:
+            self._files[name] = self._library.read(name)
+        return self._files[name]
+
+
 def _read(path: Path) -> bytes:
     try:
         if path.is_dir():

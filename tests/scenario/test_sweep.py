@@ -121,3 +121,11 @@ def test_too_many_cases_are_refused(tmp_path):
     values = json.dumps(list(range(1, 102)))
     grid = f"  grid: {{rate: {values}, duration: {values}}}\n"
     assert "makes 10201 cases; at most 10000 are run" in problems(tmp_path, grid)[0]
+
+
+def test_cases_share_their_meshes_in_memory(tmp_path):
+    (tmp_path / "ball.stl").write_bytes(b"solid ball\nendsolid\n")
+    path = write(tmp_path, GRID)
+    path.write_text(path.read_text().replace("{type: cube, size: 0.1}", "{type: mesh, file: ball.stl, scale: 1}"))
+    found = load_cases(path)
+    assert len({id(scenario.sources["ball.stl"]) for scenario in found}) == 1
