@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -66,9 +67,15 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
 
 @dataclass(frozen=True)
 class PrepareKernels:
-    """What a worker calls before its first scenario: compiles kernels, or loads those that are compiled already."""
+    """What a worker calls before its first scenario: compiles kernels, or loads those that are compiled already.
+
+    Attributes:
+        needs: what its scenarios compute.
+        rrd: they make rerun recordings too, so that library is loaded as well.
+    """
 
     needs: tuple[Needs, ...]
+    rrd: bool = False
 
     def __call__(self, tell: Callable[[str], None]) -> None:
         """Run the small scene with each combination of methods."""
@@ -85,3 +92,5 @@ class PrepareKernels:
             scenario = load_sources("prepare.yaml", {"prepare.yaml": text})
             for _ in simulate(scenario, model=needs.model):
                 pass
+        if self.rrd:
+            importlib.import_module("rerun")

@@ -186,7 +186,7 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
     limits: dict[str, Any] = {
         "timeout": execution.timeout,
         "memory": execution.memory,
-        "prepare": PrepareKernels(tuple(needs)),
+        "prepare": PrepareKernels(tuple(needs), rrd=any(order.rrd for order in orders)),
         "follow": watch.follow,
     }
     if execution.dask is not None:

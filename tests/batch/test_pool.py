@@ -1,6 +1,8 @@
 """Tasks that crash, hang, eat memory or leave children do not disturb the others."""
 
 import contextlib
+import subprocess
+import sys
 import time
 
 import psutil
@@ -88,6 +90,20 @@ def test_closing_the_iterator_ends_every_process():
     endings.close()
     assert time.monotonic() - begin < 5.0
     assert children() == before
+
+
+def test_workers_do_not_outlive_a_pool_that_is_killed():
+    code = (
+        "from replay.batch.pool import Pool, Task; from tests.batch.tasks import behave;"
+        "list(Pool(behave, workers=1, follow=lambda *_: print('on', flush=True)).run([Task('a', ('hang', None))]))"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "on\n"
+        family = psutil.Process(process.pid).children(recursive=True)
+        process.kill()
+    _, alive = psutil.wait_procs(family, timeout=10.0)
+    assert family
+    assert not alive
 
 
 def test_limits_must_be_positive():
