@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.pairs import CollisionBody
-from replay.collision.support import Sets
+from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
 from replay.geometry.bounds import fit_aabb, fit_obb, fit_sphere
 from replay.geometry.convex import ConvexSets, convex_sets
@@ -75,8 +75,8 @@ def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
     extent = np.maximum(np.abs(lower), np.abs(upper))
     half = np.maximum(upper - center, center - lower) * _INFLATION + 2.0**-52 * extent
     return Bodies(
-        sets=Sets(
-            np.ascontiguousarray(np.concatenate(vertices)),
+        sets=make_sets(
+            np.concatenate(vertices),
             _joined([sets.first for sets in several], vertex_first),
             _joined([sets.neighbors_first for sets in several], edge_first),
             np.concatenate([sets.neighbors for sets in several]),

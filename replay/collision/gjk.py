@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.collision import gjk_exact, gjk_kernel
-from replay.collision.support import Sets
+from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
 
@@ -185,8 +185,8 @@ class _Problem:
 
 def _sets(vertices: Floats) -> Sets:
     n = len(vertices)
-    return Sets(
-        np.ascontiguousarray(vertices),
+    return make_sets(
+        vertices,
         np.array([0, n], dtype=np.int64),
         np.zeros(n + 1, dtype=np.int64),
         np.zeros(0, dtype=np.int64),

@@ -3,7 +3,8 @@
 A and B meet iff the Minkowski difference A - B holds the origin; their distance is its distance to the origin. The loop
 keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance), and
 asks for the point w of A - B that is lowest along v. Nothing in A - B is lower, so v.w/|v| is a lower bound on the
-distance along -v/|v|, and w is the simplex's next point.
+distance along -v/|v|, and w is the simplex's next point. Without a simplex to start from, v is the mean of B's vertices
+subtracted from that of A's.
 
 Nothing is answered without a proof:
 - SEPARATED: a lower bound minus its rounding error is above `cutoff` (0 asks for the boolean, inf for the distance),
@@ -42,7 +43,7 @@ from replay.collision.gjk_exact import (
     refine,
     write_witness,
 )
-from replay.collision.support import Sets, farthest
+from replay.collision.support import Sets, farthest_by_climbing, farthest_of_all
 from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
@@ -93,43 +94,49 @@ def query(
     """
     simplex, points, weights, result = work.simplex, work.points, work.weights, work.result
     n = simplex[4, 0]
-    if n == 0:
-        n = 1
-        simplex[0, 0], simplex[0, 1] = a.first[set_a], b.first[set_b]
-        simplex[4, 0] = 1
     for k in range(n):
         x, y, z = mapped(b, simplex[k, 1], rotation, translation)
         i = simplex[k, 0]
         points[k, 0], points[k, 1], points[k, 2] = a.vertices[i, 0] - x, a.vertices[i, 1] - y, a.vertices[i, 2] - z
     result[DISTANCE], result[LOWER], result[STEPS], result[EXACT] = np.inf, 0.0, 0.0, 0.0
     result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = 0.0, 0.0, 0.0
-    climbs = b.neighbors_first[b.first[set_b]] < b.neighbors_first[b.first[set_b + 1]]
-    climbs = climbs or a.neighbors_first[a.first[set_a]] < a.neighbors_first[a.first[set_a + 1]]
-    least = CLIMB_CHECKED * size if climbs else 0.0
+    begin_a, end_a, climbs_a = a.first[set_a], a.first[set_a + 1], a.table[set_a] >= 0
+    begin_b, end_b, climbs_b = b.first[set_b], b.first[set_b + 1], b.table[set_b] >= 0
+    least = CLIMB_CHECKED * size if climbs_a or climbs_b else 0.0
     bound = ROUNDING * size
     shortest = np.inf
     for _ in range(ITERATIONS):
-        place, vx, vy, vz = _nearest(points, n, size, weights)
-        if place == faces.INSIDE:
-            result[DISTANCE] = 0.0
-            write_witness(a, b, rotation, translation, work)
-            return CONTACT
-        square = vx * vx + vy * vy + vz * vz
-        if place == faces.UNSURE or not (bound * bound < square < shortest):
-            break
-        shortest = square
+        if n == 0:  # the way from mean to mean is a point of A - B too, though of no simplex
+            vx, vy, vz = _between_means(a, set_a, b, set_b, rotation, translation)
+            square = vx * vx + vy * vy + vz * vz
+            if not square > bound * bound:
+                vx, vy, vz, square = size, 0.0, 0.0, size * size
+        else:
+            place, vx, vy, vz = _nearest(points, n, size, weights)
+            if place == faces.INSIDE:
+                result[DISTANCE] = 0.0
+                write_witness(a, b, rotation, translation, work)
+                return CONTACT
+            square = vx * vx + vy * vy + vz * vz
+            if place == faces.UNSURE or not (bound * bound < square < shortest):
+                break
+            shortest = square
+            n = keep_supporting(simplex, points, weights, n)
         length = math.sqrt(square)
-        n = keep_supporting(simplex, points, weights, n)
         result[STEPS] += 1.0
-        i = farthest(a, set_a, -vx, -vy, -vz, simplex[n - 1, 0])
-        j = farthest(
-            b,
-            set_b,
-            rotation[0, 0] * vx + rotation[1, 0] * vy + rotation[2, 0] * vz,
-            rotation[0, 1] * vx + rotation[1, 1] * vy + rotation[2, 1] * vz,
-            rotation[0, 2] * vx + rotation[1, 2] * vy + rotation[2, 2] * vz,
-            simplex[n - 1, 1],
-        )
+        last = max(n - 1, 0)
+        if climbs_a:
+            i = farthest_by_climbing(a, set_a, -vx, -vy, -vz, simplex[last, 0])
+        else:
+            i = farthest_of_all(a.vertices, begin_a, end_a, -vx, -vy, -vz)
+        # v along B's axes
+        x = rotation[0, 0] * vx + rotation[1, 0] * vy + rotation[2, 0] * vz
+        y = rotation[0, 1] * vx + rotation[1, 1] * vy + rotation[2, 1] * vz
+        z = rotation[0, 2] * vx + rotation[1, 2] * vy + rotation[2, 2] * vz
+        if climbs_b:
+            j = farthest_by_climbing(b, set_b, x, y, z, simplex[last, 1])
+        else:
+            j = farthest_of_all(b.vertices, begin_b, end_b, x, y, z)
         x, y, z = mapped(b, j, rotation, translation)
         wx, wy, wz = a.vertices[i, 0] - x, a.vertices[i, 1] - y, a.vertices[i, 2] - z
         lower = (vx * wx + vy * wy + vz * wz) / length - bound
@@ -140,7 +147,7 @@ def query(
             if result[LOWER] > cutoff:
                 result[DISTANCE] = length
                 return SEPARATED
-            if length - result[LOWER] <= CLOSED * length + slack:
+            if n > 0 and length - result[LOWER] <= CLOSED * length + slack:
                 witness = _witness_distance(points, n, weights)
                 if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
                     break  # a sliver's normal was off, and v with it
@@ -157,6 +164,19 @@ def query(
         n += 1
         simplex[4, 0] = n
     return refine(a, set_a, b, set_b, rotation, translation, size, cutoff, work)
+
+
+@leaf_kernel
+def _between_means(
+    a: Sets, set_a: int, b: Sets, set_b: int, rotation: Floats, translation: Floats
+) -> tuple[float, float, float]:
+    """Return the mean of A's vertices less that of B's, in A's frame."""
+    x, y, z = b.center[set_b, 0], b.center[set_b, 1], b.center[set_b, 2]
+    return (
+        a.center[set_a, 0] - (rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]),
+        a.center[set_a, 1] - (rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]),
+        a.center[set_a, 2] - (rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]),
+    )
 
 
 @leaf_kernel

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.pairs import CollisionBody, DisabledPair, Pair, plan_pairs
-from replay.errors import MeshError, Problem, ScenarioError
+from replay.errors import InvalidValue, MeshError, Problem, ScenarioError
 from replay.geometry import primitives
 from replay.geometry.mesh import load_mesh
 from replay.geometry.solid import Solid
@@ -227,7 +227,11 @@ def _collision(
         return (), ()
     bodies = tuple(CollisionBody(shape.name, shape.link, shape.solid) for shape in scene_shapes if shape.collides)
     disabled = [DisabledPair(entry.pair[0], entry.pair[1], entry.reason) for entry in scenario.collision.disable]
-    return bodies, plan_pairs(bodies, machine, disabled=disabled)
+    try:
+        return bodies, plan_pairs(bodies, machine, disabled=disabled)
+    except InvalidValue as error:
+        rule = f"makes {error.value} pairs: {error.rule}"
+        raise ScenarioError([scenario.provenance.problem(("collision", "pairs"), rule)]) from None
 
 
 def _ignored(machine: Linkage, patterns: Sequence[str]) -> frozenset[int]:

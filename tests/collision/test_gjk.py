@@ -10,18 +10,20 @@ from scipy.spatial import ConvexHull
 
 from replay.collision import gjk_exact, gjk_kernel
 from replay.collision.gjk import Status, distance, intersect
-from replay.collision.support import Sets
+from replay.collision.support import make_sets
 from replay.errors import InvalidValue
+from replay.geometry.convex import from_pieces
+from replay.geometry.primitives import cone, cylinder
 from tests.collision import motions, reference
 
 UNIT = reference.box((1, 1, 1))
 
 
 def sets(bodies):
-    """Return bodies, each one convex set, as one `Sets`."""
+    """Return bodies, each one convex set, as `Sets`."""
     first = np.cumsum([0, *(len(body) for body in bodies)])
     none = np.zeros(0, dtype=np.int64)
-    return Sets(np.concatenate(bodies), first, np.zeros(first[-1] + 1, dtype=np.int64), none)
+    return make_sets(np.concatenate(bodies), first, np.zeros(first[-1] + 1, dtype=np.int64), none)
 
 
 def run_boxes(n, seed):
@@ -108,6 +110,47 @@ def test_random_hulls_agree_with_features():
     assert 0.3 < hits / n < 0.7
     assert (wrong, undecided) == (0, 0)
     assert worst <= 1e-12
+
+
+def test_climbing_finds_what_looking_at_every_vertex_finds():
+    """Round, flat-topped, needle and off-centre hulls, at gaps from contact to far: same status, same distance."""
+    rng = np.random.default_rng(31)
+    directions = rng.normal(size=(300, 3))
+    directions /= np.sqrt((directions**2).sum(axis=1))[:, None]
+    shapes = (
+        directions * np.array([0.5, 0.4, 0.3]),
+        cylinder(0.3, 1.0, 0.0005).vertices,
+        cone(0.01, 2.0, 0.00001).vertices,
+        directions[:100] * np.array([0.01, 0.01, 1.0]) + np.array([5.0, 0, 0]),
+    )
+    hulls = [from_pieces([shape]) for shape in shapes]
+    climbed = [make_sets(hull.vertices, hull.first, hull.neighbors_first, hull.neighbors) for hull in hulls]
+    looked_at = [sets([hull.vertices]) for hull in hulls]
+    assert all((several.table == 0).all() for several in climbed)
+    assert all((several.table == -1).all() for several in looked_at)
+    work = gjk_kernel.workspace()
+    met = 0
+    for _ in range(400):
+        i, j = rng.integers(0, len(hulls), 2)
+        turn = motions.rotation(rng) if rng.random() < 0.7 else np.identity(3)
+        place = 20.0 * np.identity(3)[rng.integers(3)] if rng.random() < 0.3 else 12.0 * rng.normal(size=3)
+        _pair(looked_at[i], looked_at[j], turn, place, 100.0, np.inf, work)
+        gap = rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-14, -1)
+        place = place - (work.result[gjk_exact.DISTANCE] - gap) * work.result[gjk_exact.DIRECTION :][:3]
+        for cutoff in (0.0, np.inf):
+            truth = _pair(looked_at[i], looked_at[j], turn, place, 20.0, cutoff, work)
+            expected = work.result[gjk_exact.DISTANCE]
+            assert _pair(climbed[i], climbed[j], turn, place, 20.0, cutoff, work) == truth
+            met += truth == gjk_exact.CONTACT
+            if truth == gjk_exact.SEPARATED and cutoff == np.inf:
+                assert work.result[gjk_exact.DISTANCE] == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    assert 100 < met < 700
+
+
+@numba.njit
+def _pair(a, b, rotation, translation, size, cutoff, work):
+    work.simplex[4, 0] = 0
+    return gjk_kernel.query(a, 0, b, 0, rotation, translation, size, cutoff, 0.0, work)
 
 
 @pytest.mark.soak

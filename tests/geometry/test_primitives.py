@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from replay.errors import InvalidValue
 from replay.geometry import primitives
-from replay.geometry.convex import convex_sets
+from replay.geometry.convex import BRUTE_FORCE_VERTICES, convex_sets
 from replay.geometry.solid import Solid, signed_volume
 from replay.numerics import transforms
 
@@ -172,7 +172,7 @@ def test_convex_sets_cover_the_solid(name: str) -> None:
             for direction in np.random.default_rng(k).normal(size=(30, 3)):
                 best = np.max(vertices @ direction)
                 assert best == pytest.approx(np.max(expected @ direction), rel=1e-14)
-                if len(vertices) > 64:
+                if len(vertices) > BRUTE_FORCE_VERTICES:
                     assert climb(sets, k, direction) == pytest.approx(best, rel=1e-14)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.collision import pairs
 from replay.errors import ScenarioError
 from replay.kinematics.motion import sample
 from replay.scenario import scene as scene_module
@@ -163,3 +164,10 @@ def test_expectations_know_the_scenes_names_and_places(full):
     ]
     lines = [outcome.place.line for outcome in outcomes]
     assert lines == sorted(lines) and Path(outcomes[0].place.file).name == "full.yaml"
+
+
+def test_more_pairs_than_results_can_hold_are_refused_with_a_way_out(monkeypatch):
+    monkeypatch.setattr(pairs, "MOST_PAIRS", 1)
+    links = "".join(f"  l{k}: {{joint: {{type: free}}, shapes: {{s: {{type: cube, size: 1}}}}}}\n" for k in range(3))
+    with pytest.raises(ScenarioError, match=r"collision.pairs.* makes 3 pairs: .*disable pairs that cannot meet"):
+        build_text(f"links:\n{links}")
