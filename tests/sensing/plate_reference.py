@@ -16,7 +16,8 @@ def plate_integral(triangle: Sequence[Sequence[float]], half_size: Sequence[floa
         corners = [[mp.mpf(x) for x in corner] for corner in triangle]
         hx, hy = mp.mpf(half_size[0]), mp.mpf(half_size[1])
         total = mp.mpf(0)
-        for sign in (1, -1) if side == "both" else (1,):
+        flat = not any(p[2] for p in corners)
+        for sign in (1, -1) if side == "both" and not flat else (1,):
             half = _clip(corners, lambda p, sign=sign: sign * p[2])
             for u, x_sides in _slabs(0, hx):
                 column = half
@@ -26,7 +27,8 @@ def plate_integral(triangle: Sequence[Sequence[float]], half_size: Sequence[floa
                     piece = column
                     for y_side in y_sides:
                         piece = _clip(piece, y_side)
-                    total += _piece_integral([[u(p), v(p), abs(p[2])] for p in piece], piece)
+                    if _owned(piece, u, x_sides) and _owned(piece, v, y_sides):
+                        total += _piece_integral([[u(p), v(p), abs(p[2])] for p in piece], piece)
         return total
 
 
@@ -41,6 +43,11 @@ def _slabs(axis, half):
         return -half - p[axis]
 
     return ((high, [high]), (low, [low]), (zero, [lambda p: half - p[axis], lambda p: half + p[axis]]))
+
+
+def _owned(piece: list[Corner], distance, sides) -> bool:
+    """A piece that lies in a border plane belongs to the slab between the borders."""
+    return len(sides) == 2 or any(distance(p) > 0 for p in piece)
 
 
 def _clip(polygon: list[Corner], inside) -> list[Corner]:

@@ -16,6 +16,8 @@ u, v and z being linear on a piece. All terms are positive. What makes it exact 
 - Where an edge crosses z = 0 or a border in x, the distances beyond the other borders may cancel; they are formed there
   with twice the digits. (Cuts in y come last and combine only distances of one sign.)
 - An edge is cut at the same point, to the last digit, whichever of its two pieces asks.
+- A piece that lies in a border plane belongs to the slab between the borders: it is beyond a border only if one of its
+  corners is, strictly. What lies in z = 0 counts as above. So every piece is counted once.
 """
 
 from __future__ import annotations
@@ -116,7 +118,10 @@ def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: 
 
 @kernel
 def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
-    """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE."""
+    """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE.
+
+    A polygon in the border's plane is not beyond it.
+    """
     if outside != NONE:
         farthest = polygon[0, outside]
         for k in range(1, count):
