@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from replay.collision.gjk import distance, intersect
 from replay.collision.gjk_exact import CONTACT, DISTANCE, SEPARATED, Workspace
 from replay.collision.gjk_kernel import query
-from replay.collision.support import Sets
+from replay.collision.support import Sets, make_sets
 from replay.geometry.convex import from_pieces
 from replay.geometry.hull import convex_hull
 from replay.numerics import transforms
@@ -72,7 +72,7 @@ class Engine:
 def sets_of(vertices: Floats) -> Sets:
     """Return one convex set as the kernels read it."""
     body = from_pieces([vertices])
-    return Sets(body.vertices, body.first, body.neighbors_first, body.neighbors)
+    return make_sets(body.vertices, body.first, body.neighbors_first, body.neighbors)
 
 
 @kernel
