@@ -3,10 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RECORDINGS := recordings
+BASELINES := tests/baselines
+NIGHT := regress
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format type schemas pictures soak clean system
+.PHONY: help setup run regress accept test lint format type schemas pictures soak clean system
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## */\1\t/' | awk -F'\t' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -29,6 +31,13 @@ run: setup  ## run every scenario under scenarios/ and say where the recordings 
 	@echo "Recordings are in $(RECORDINGS)/<scenario>/. Look at one with:"
 	@echo "  $(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd"
 	@echo "  $(BIN)/replay info $(RECORDINGS)/carm_head_contact/carm_head_contact.mcap"
+
+regress: setup  ## run every scenario and compare it with its accepted recording; the report is regress/index.html
+	@$(BIN)/replay regress scenarios --baseline $(BASELINES) -o $(NIGHT) || { code=$$?; \
+	  echo "If the new results are right: make accept REASON='why they are'"; exit $$code; }
+
+accept: setup  ## make the results of `make regress` the accepted ones: make accept REASON='why'
+	$(BIN)/replay accept $(NIGHT) --baseline $(BASELINES) --reason "$(REASON)"
 
 test: $(VENV)/.test system lint type  ## install what is missing, then lint, types and all tests
 	$(BIN)/python -m pytest -n 2 --dist loadfile
@@ -57,12 +66,13 @@ pictures: setup system  ## render the README's pictures from the recordings that
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
 
-system:  # a software Vulkan driver, so that the viewer can render without a GPU
-	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 || { \
+system:  # a software Vulkan driver for the viewer, and a browser that looks at reports in tests
+	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && command -v chromium >/dev/null || { \
 	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	    apt-get update -qq && apt-get install -qq -y --no-install-recommends mesa-vulkan-drivers >/dev/null; \
-	  else echo "no Vulkan driver found; screenshots need one (Debian: apt-get install mesa-vulkan-drivers)" >&2; fi; }
+	    apt-get update -qq && apt-get install -qq -y --no-install-recommends mesa-vulkan-drivers chromium >/dev/null; \
+	  else echo "screenshots need a Vulkan driver, tests a browser" \
+	    "(Debian: apt-get install mesa-vulkan-drivers chromium)" >&2; fi; }
 
 clean:  ## remove the environment, recordings and caches
-	rm -rf $(VENV) $(RECORDINGS) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(RECORDINGS) $(NIGHT) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

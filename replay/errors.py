@@ -104,6 +104,14 @@ class WriteError(ReplayError):
         super().__init__(f"{file}: cannot be written: {reason}")
 
 
+class WorkerError(ReplayError):
+    """Worker processes cannot be used: they die before they have begun."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"worker processes cannot be started: {reason}")
+
+
 class CurveError(ReplayError):
     """A file with a measured curve cannot be read, or one of its rows cannot be used."""
 

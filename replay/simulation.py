@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,12 +97,12 @@ class Simulation:
             yield self.block(first)
 
 
-def simulate(scenario: Scenario, *, model: Model | None = None) -> Iterator[FrameBlock]:
+def simulate(scenario: Scenario, *, model: Model | str | Path | None = None) -> Iterator[FrameBlock]:
     """Yield a scenario's frames in blocks of `BLOCK_FRAMES`, the last one shorter.
 
     Args:
         scenario: what `replay.load` returned.
-        model: replaces the scenario's own model, see `replay.scenario.load.load_model`.
+        model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
 
     Raises:
         ScenarioError: a mesh cannot be used, or an expectation is about a pair that is not tested.

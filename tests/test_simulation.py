@@ -93,6 +93,8 @@ def test_a_model_replaces_the_scenarios_own(swing):
     own = np.concatenate([block.capacitive.capacitance for block in replay.simulate(swing)])
     thesis = BUILTIN_MODELS["thesis2015"]
     other = np.concatenate([block.capacitive.capacitance for block in replay.simulate(swing, model=thesis)])
+    named = np.concatenate([block.capacitive.capacitance for block in replay.simulate(swing, model="thesis2015")])
+    np.testing.assert_array_equal(named, other)
     assert not np.array_equal(own, other)
     finite = np.isfinite(own) & np.isfinite(other)
     assert finite.any()

@@ -1,78 +1,109 @@
-"""One scenario after another into a run folder: recordings, result.json and log.txt for each, run.json for all."""
+"""Many scenarios into a run folder: recordings, result.json and log.txt for each, run.json for all.
+
+Every scenario runs in a worker process; see `batch.pool`. Results do not depend on how many there are.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import json
+import os
 import platform
-import time
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import psutil
 
 import replay
-from replay.errors import RecordingExistsError, ReplayError, WriteError
-from replay.recording.record import Progress, RecordedPaths, record_blocks
+from replay.batch.case import CaseOrder, CaseResult, Status, describe, run_case
+from replay.batch.cost import expected_cost
+from replay.batch.pool import Ended, Ending, Pool, Task
+from replay.batch.prepare import PrepareKernels, needs_of
+from replay.batch.resume import RESULT, earlier_result
+from replay.errors import RecordingExistsError, WriteError
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
-from replay.scenario.scene import build
-from replay.scenario.verdict import ExpectationCheck, Outcome
-from replay.simulation import FrameBlock, Simulation
+
+_STATUS = {Ending.CRASHED: Status.CRASHED, Ending.TIMEOUT: Status.TIMEOUT, Ending.MEMORY: Status.MEMORY}
 
 
 @dataclass(frozen=True)
-class CaseResult:
-    """What became of one scenario.
+class Execution:
+    """How scenarios are run; nothing of this changes a result.
 
     Attributes:
-        name: of the scenario.
-        frames: frames computed.
-        outcomes: what became of each expectation.
-        recordings: where they are; None when the scenario failed before there were any.
-        error: the one line that says why it failed; "" when it did not.
-        trace: where in the program it crashed, for log.txt; "" when its failure has a known cause.
-        counters: what the collision pipeline did, by counter.
-        seconds: wall time.
-        notes: what a reader should know about the scene.
+        workers: processes; None for as many as there are cores, and never more than scenarios.
+        timeout: longest time of one scenario [s]; None for none.
+        memory: most resident memory of one scenario [bytes]; None for any.
+        dask: address of a Dask scheduler that runs them instead of this machine.
     """
 
-    name: str
-    frames: int = 0
-    outcomes: tuple[Outcome, ...] = ()
-    recordings: RecordedPaths | None = None
-    error: str = ""
-    trace: str = ""
-    counters: dict[str, int] = field(default_factory=dict)
-    seconds: float = 0.0
-    notes: tuple[str, ...] = ()
+    workers: int | None = None
+    timeout: float | None = None
+    memory: int | None = None
+    dask: str | None = None
+
+
+class Watch(Protocol):
+    """Who follows a run."""
+
+    def plan(self, costs: dict[str, float]) -> None:
+        """Take what is going to run: names with expected costs."""
+
+    def follow(self, name: str, done: int, total: int) -> None:
+        """Take how many frames of a scenario are done; (name, 0, 0) when it begins."""
+
+    def done(self, result: CaseResult) -> None:
+        """Take what became of a scenario."""
+
+    def tell(self, text: str) -> None:
+        """Take a remark."""
+
+
+class Unwatched:
+    """Nobody follows."""
+
+    def plan(self, costs: dict[str, float]) -> None:
+        """Do nothing."""
+
+    def follow(self, name: str, done: int, total: int) -> None:
+        """Do nothing."""
+
+    def done(self, result: CaseResult) -> None:
+        """Do nothing."""
+
+    def tell(self, text: str) -> None:
+        """Do nothing."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of a run.
+
+    Attributes:
+        directory: the run folder.
+        results: of each scenario, in the order in which they were given.
+        interrupted: it was ended before all scenarios were.
+        started: when.
+        seconds: wall time.
+        workers: number of processes.
+    """
+
+    directory: Path
+    results: tuple[CaseResult, ...]
+    interrupted: bool
+    started: datetime.datetime
+    seconds: float
+    workers: int
 
     @property
-    def broken(self) -> tuple[Outcome, ...]:
-        """The expectations that did not hold."""
-        return tuple(outcome for outcome in self.outcomes if not outcome.passed)
-
-    @property
-    def status(self) -> str:
-        """Return "passed", "broken" (an expectation does not hold) or "failed" (no result)."""
-        return "failed" if self.error else "broken" if self.broken else "passed"
-
-    def as_json(self) -> dict[str, Any]:
-        """Return what result.json holds: nothing that depends on the machine, the clock or the folder."""
-        return {
-            "scenario": self.name,
-            "status": self.status,
-            "frames": self.frames,
-            "error": self.error,
-            "expectations": [
-                {"expectation": outcome.expectation, "passed": outcome.passed, "detail": outcome.detail}
-                for outcome in self.outcomes
-            ],
-            "counters": self.counters,
-            "notes": list(self.notes),
-        }
+    def passed(self) -> bool:
+        """Whether every scenario was recorded and kept its expectations."""
+        return all(result.status is Status.PASSED for result in self.results)
 
 
 def run_all(
@@ -82,130 +113,163 @@ def run_all(
     model: Model | None = None,
     rrd: bool = True,
     overwrite: bool = False,
-    progress: Callable[[Scenario], Progress] | None = None,
-    done: Callable[[CaseResult], None] | None = None,
-) -> list[CaseResult]:
-    """Run scenarios one after another, each into DIRECTORY/NAME/, and write DIRECTORY/run.json.
+    resume: bool = False,
+    execution: Execution | None = None,
+    watch: Watch | None = None,
+) -> Run:
+    """Run scenarios, each into DIRECTORY/NAME/, and write DIRECTORY/run.json.
 
-    A scenario that fails does not stop the others; its result says why.
+    A scenario that fails, crashes, hangs or eats memory does not stop the others; its result says so. An interrupt
+    (Ctrl-C) ends all processes and is told by `interrupted`; what was finished is kept.
 
     Args:
         scenarios: what to run.
         directory: the run folder; made when it is not there.
         model: replaces the scenarios' own models.
         rrd: whether to make rerun recordings too.
-        overwrite: replace recordings that exist.
-        progress: called at the start of each scenario for what follows its frames.
-        done: called with each result.
+        overwrite: replace recordings that exist; one whose scenario now fails is removed.
+        resume: keep the results of an earlier run that are still valid, and replace the others.
+        execution: where, and within which limits.
+        watch: follows the run.
 
     Raises:
         RecordingExistsError: a recording exists and may not be overwritten; nothing is run then.
         WriteError: the run folder cannot be written.
+        WorkerError: worker processes cannot be started.
     """
-    directory = Path(directory)
-    for scenario in scenarios if not overwrite else ():
-        for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
-            if recording.exists():
-                raise RecordingExistsError(str(recording))
+    execution, watch, directory = execution or Execution(), watch or Unwatched(), Path(directory)
     started = datetime.datetime.now(datetime.UTC)
-    results = []
-    try:
+    results: dict[str, CaseResult] = {}
+    if resume:
+        results = _reused(scenarios, directory, model=model, rrd=rrd, watch=watch)
+    elif not overwrite:
         for scenario in scenarios:
-            follow = progress(scenario) if progress else None
-            result = run_case(scenario, directory, model=model, rrd=rrd, overwrite=overwrite, progress=follow)
-            results.append(result)
-            if done:
-                done(result)
-    finally:
-        _write_run(directory, started, results, len(scenarios))
+            for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
+                if recording.exists():
+                    raise RecordingExistsError(str(recording))
+    left = [scenario for scenario in scenarios if scenario.name not in results]
+    costs = {scenario.name: expected_cost(scenario) for scenario in left}
+    watch.plan(costs)
+    tasks = []
+    for scenario in left:
+        folder = directory / scenario.name
+        write(folder / "log.txt", "")
+        tasks.append(
+            Task(scenario.name, CaseOrder(scenario, folder, model, rrd), costs[scenario.name], folder / "log.txt")
+        )
+    interrupted = False
+    workers = min(execution.workers or os.cpu_count() or 1, max(len(tasks), 1))
+    try:
+        with contextlib.closing(_endings(tasks, workers, execution, watch)) as endings:
+            for ended in endings:
+                result = _result(ended)
+                _finish(result, ended.task.payload.folder)
+                results[result.name] = result
+                watch.done(result)
+    except KeyboardInterrupt:
+        interrupted = True
+    for scenario in scenarios if interrupted else ():
+        if scenario.name not in results:
+            _remove_unfinished(directory / scenario.name)
+        lost = CaseResult(scenario.name, Status.INTERRUPTED, error="the run was ended before this scenario was")
+        results.setdefault(scenario.name, lost)
+    seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
+    ordered = tuple(results[scenario.name] for scenario in scenarios)
+    run = Run(directory, ordered, interrupted, started, seconds, workers)
+    write(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
+    return run
+
+
+def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: Watch) -> Generator[Ended]:
+    orders = [task.payload for task in tasks]
+    needs = {need: None for order in orders for need in needs_of([order.scenario], order.model)}
+    limits: dict[str, Any] = {
+        "timeout": execution.timeout,
+        "memory": execution.memory,
+        "prepare": PrepareKernels(tuple(needs)),
+        "follow": watch.follow,
+    }
+    if execution.dask is not None:
+        from replay.batch.cluster import Cluster
+
+        yield from Cluster(execution.dask, run_case, **limits).run(tasks)
+    else:
+        yield from Pool(run_case, workers=workers, tell=watch.tell, **limits).run(tasks)
+
+
+def _reused(
+    scenarios: Sequence[Scenario], directory: Path, *, model: Model | None, rrd: bool, watch: Watch
+) -> dict[str, CaseResult]:
+    results = {}
+    for scenario in scenarios:
+        found = earlier_result(scenario, directory / scenario.name, model=model, rrd=rrd)
+        if isinstance(found, CaseResult):
+            results[scenario.name] = found
+            watch.tell(f"{scenario.name}: reused")
+        else:
+            watch.tell(f"{scenario.name}: runs again: {found}")
     return results
 
 
-def run_case(
-    scenario: Scenario,
-    directory: Path,
-    *,
-    model: Model | None = None,
-    rrd: bool = True,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-) -> CaseResult:
-    """Run one scenario into DIRECTORY/NAME/ and return what became of it; arguments as of `run_all`."""
-    begin = time.perf_counter()
-    folder = directory / scenario.name
+def _result(ended: Ended) -> CaseResult:
+    if ended.ending is Ending.DONE:
+        result: CaseResult = dataclasses.replace(ended.value, memory=ended.memory)
+        return result
+    return CaseResult(
+        ended.task.name, _STATUS[ended.ending], error=ended.reason, seconds=ended.seconds, memory=ended.memory
+    )
+
+
+def _finish(result: CaseResult, folder: Path) -> None:
+    """Leave the folder as the result says: no recording of an earlier run beside the failure of this one."""
+    if not result.status.recorded:
+        for kind in (".mcap", ".rrd"):
+            with contextlib.suppress(OSError):
+                (folder / f"{result.name}{kind}").unlink(missing_ok=True)
+    write(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
     try:
-        scene = build(scenario, model=model)
-        simulation = Simulation(scene)
-        check = scene.expectation_check()
-        blocks = _checked(simulation.blocks(), check)
-        recordings = record_blocks(scene, blocks, folder, rrd=rrd, overwrite=overwrite, progress=progress)
-    except WriteError:
-        raise  # no later scenario could be written either
-    except ReplayError as error:
-        result = CaseResult(scenario.name, error=str(error), seconds=time.perf_counter() - begin)
-    except Exception as error:  # a crash is this scenario's result; the night goes on with the next
-        result = CaseResult(
-            scenario.name,
-            error=f"crashed: {type(error).__name__}: {error}",
-            trace=traceback.format_exc(),
-            seconds=time.perf_counter() - begin,
-        )
-    else:
-        result = CaseResult(
-            scenario.name,
-            frames=scene.frames,
-            outcomes=tuple(check.finish()),
-            recordings=recordings,
-            counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
-            seconds=time.perf_counter() - begin,
-            notes=scene.notes,
-        )
-    _write(folder / "result.json", json.dumps(result.as_json(), indent=1) + "\n")
-    _write(folder / "log.txt", "".join(f"{line}\n" for line in describe(result)) + result.trace)
-    return result
+        with (folder / "log.txt").open("a", encoding="utf-8") as log:
+            log.writelines(f"{line}\n" for line in describe(result))
+    except OSError as error:
+        raise WriteError(str(folder / "log.txt"), error.strerror or str(error)) from None
 
 
-def describe(result: CaseResult) -> list[str]:
-    """Return a result as lines for people."""
-    if result.error:
-        return [f"{result.name}: failed", *(f"  {line}" for line in result.error.splitlines())]
-    pace = result.frames / result.seconds if result.seconds > 0.0 else 0.0
-    lines = [f"{result.name}: {result.status}, {result.frames} frames in {result.seconds:.1f} s ({pace:.0f} a second)"]
-    for outcome in result.outcomes:
-        lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
-    lines.extend(f"  note: {note}" for note in result.notes)
-    return lines
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what a scenario that was ended has written; what an earlier run left stays."""
+    for file in (*folder.glob("*.part"), folder / "log.txt"):
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
 
 
-def report(result: CaseResult) -> list[str]:
-    """Return a result as lines for people, and where its recordings are."""
-    made = result.recordings
-    return [*describe(result), *(f"  {path}" for path in ((made.mcap, made.rrd) if made else ()) if path)]
-
-
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
-    for block in blocks:
-        check.update(block.time, block.collision, block.distance, block.capacitive)
-        yield block
-
-
-def _write_run(directory: Path, started: datetime.datetime, results: Sequence[CaseResult], planned: int) -> None:
-    """Write what belongs to this machine and this moment, beside recordings that know neither."""
-    content = {
+def as_json(run: Run) -> dict[str, object]:
+    """Return what run.json holds: what belongs to this machine and this moment, which recordings do not know."""
+    return {
         "replay": replay.__version__,
         "host": platform.node(),
+        "platform": platform.platform(),
         "python": platform.python_version(),
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": round((datetime.datetime.now(datetime.UTC) - started).total_seconds(), 3),
-        "planned": planned,
+        "cores": os.cpu_count(),
+        "memory": psutil.virtual_memory().total,
+        "workers": run.workers,
+        "started": run.started.isoformat(timespec="seconds"),
+        "seconds": round(run.seconds, 3),
+        "interrupted": run.interrupted,
+        "planned": len(run.results),
         "scenarios": {
-            result.name: {"status": result.status, "seconds": round(result.seconds, 3)} for result in results
+            result.name: {
+                "status": result.status.value,
+                "seconds": round(result.seconds, 3),
+                "memory": result.memory,
+                **({"error": result.error} if result.error else {}),
+                **({"reused": True} if result.reused else {}),
+            }
+            for result in run.results
         },
     }
-    _write(directory / "run.json", json.dumps(content, indent=1) + "\n")
 
 
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
+    """Write a text file and the folders that it needs; WriteError when that is not possible."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
-from replay.scenario.load import load, load_sources
+from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
+
+RULES = "rules.yaml"
+"""Name of the file of tolerances that comes with a folder of scenarios."""
 
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
 
@@ -40,8 +45,15 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     return list(found)
 
 
+def rules_beside(paths: Sequence[str | Path]) -> Path | None:
+    """Return the tolerances that come with scenarios: `rules.yaml` in the first folder named, or beside the file."""
+    first = Path(paths[0])
+    file = (first if first.is_dir() else first.parent) / RULES
+    return file if file.is_file() else None
+
+
 def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
-    """Return the scenarios of all paths; a recording (`.mcap`) gives the scenario that is attached to it.
+    """Return the scenarios of all paths: of a file with a sweep its cases, of a recording (`.mcap`) its own scenario.
 
     Raises:
         ScenarioError: what is wrong with any of them, all problems together; or two have the same name.
@@ -53,14 +65,15 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
         try:
-            scenario = _attached(path) if path.suffix == ".mcap" else load(path)
+            found = [_attached(path)] if path.suffix == ".mcap" else load_cases(path)
         except ScenarioError as error:
             problems.extend(error.problems)
             continue
-        if scenario.name in homes:
-            problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
-        homes[scenario.name] = path
-        scenarios.append(scenario)
+        for scenario in found:
+            if scenario.name in homes:
+                problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
+            homes[scenario.name] = path
+            scenarios.append(scenario)
     if problems:
         raise ScenarioError(problems)
     return scenarios
@@ -73,17 +86,41 @@ def select(scenarios: Sequence[Scenario], patterns: Sequence[str]) -> list[Scena
     return [scenario for scenario in scenarios if any(_matches(scenario, pattern) for pattern in patterns)]
 
 
+@dataclass(frozen=True)
+class Selection:
+    """What a command is about.
+
+    Attributes:
+        chosen: the scenarios to run.
+        skipped: those that were filtered out, by name, with the reason.
+    """
+
+    chosen: tuple[Scenario, ...]
+    skipped: Mapping[str, str]
+
+    @staticmethod
+    def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
+        """Return what paths, patterns and a shard select; errors as of `load_all`."""
+        everything = load_all(paths)
+        matching = select(everything, patterns)
+        chosen = shard.of(matching) if shard else matching
+        names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
+        skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
+        skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
+        return Selection(tuple(chosen), skipped)
+
+
 def _matches(scenario: Scenario, pattern: str) -> bool:
+    """Return whether a pattern selects a scenario; a name itself does even when it holds brackets."""
+    if scenario.name == pattern:
+        return True
     if pattern.startswith("tag:"):
         return any(fnmatch.fnmatchcase(tag, pattern.removeprefix("tag:")) for tag in scenario.tags)
     return fnmatch.fnmatchcase(scenario.name, pattern)
 
 
 def _attached(path: Path) -> Scenario:
-    from replay.logs.mcap_reader import McapLog
-    from replay.recording.reader import read_provenance
+    from replay.recording.slim import attached_files
 
-    with McapLog(path) as log:
-        provenance = read_provenance(log)
-        sources = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
-    return load_sources(provenance.root, sources)
+    name, root, files = attached_files(path)
+    return load_sources(root, files, case=name)

@@ -75,6 +75,10 @@ class Row:
         return 1e6 * self.median
 
 
+LEAST_ROUND = 2e-3
+"""[s] A contender that is faster is called several times a round: a pause of the machine must not look like its time."""
+
+
 def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> list[Row]:
     """Time contenders against each other on one case.
 
@@ -86,12 +90,11 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
         one row a contender, in the order given; `low` and `high` are the fastest and slowest round.
     """
     checks = [contender.check(contender.run()) for contender in contenders]
+    calls = [max(1, math.ceil(LEAST_ROUND / max(_seconds(contender, 1), 1e-9))) for contender in contenders]
     times: list[list[float]] = [[] for _ in contenders]
     for _ in range(rounds):
-        for contender, taken in zip(contenders, times, strict=True):
-            begin = time.perf_counter()
-            contender.run()
-            taken.append((time.perf_counter() - begin) / contender.queries)
+        for contender, count, taken in zip(contenders, calls, times, strict=True):
+            taken.append(_seconds(contender, count) / (count * contender.queries))
     return [
         Row(
             case=case,
@@ -109,6 +112,13 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
         )
         for contender, taken, check in zip(contenders, times, checks, strict=True)
     ]
+
+
+def _seconds(contender: Contender, calls: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(calls):
+        contender.run()
+    return time.perf_counter() - begin
 
 
 def exponent(points: Sequence[tuple[float, float]]) -> float:

@@ -23,6 +23,8 @@ COMMANDS = {
     "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
+    "regress": "run scenarios and compare each with its baseline",
+    "accept": "make a run's recordings the baseline",
     "view": "show recordings in the rerun viewer, or make a picture",
     "bench": "time methods and peers on the same questions, and check their answers",
 }

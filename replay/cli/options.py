@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
+from replay.cli.exit_codes import ExitCode
+from replay.cli.values import Memory, Seconds, ShardOf
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
 scenarios_argument = click.argument("scenarios", nargs=-1, required=True, type=click.Path(path_type=Path))
+model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model, not the scenarios' own.")
 select_option = click.option(
     "--select",
     "patterns",
@@ -17,6 +23,7 @@ select_option = click.option(
     metavar="GLOB|tag:NAME",
     help="Only scenarios of that name or tag; repeatable.",
 )
+shard_option = click.option("--shard", type=ShardOf(), help="Only the i-th of n parts of the scenarios.")
 format_option = click.option(
     "--format",
     "form",
@@ -25,6 +32,34 @@ format_option = click.option(
     show_default=True,
     help="Form of the result.",
 )
+_EXECUTION = (
+    click.option("--workers", type=click.IntRange(1), help="Processes; as many as there are cores when left out."),
+    click.option("--timeout", type=Seconds(), help="Longest time of one scenario, such as 90s or 10min."),
+    click.option("--memory", type=Memory(), help="Most resident memory of one scenario, such as 2GiB."),
+    click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead."),
+)
+
+
+def output_option(default: str) -> Callable[[Command], Command]:
+    """Return the option for the run folder."""
+    kind = click.Path(path_type=Path)
+    return click.option("-o", "--output", type=kind, default=Path(default), show_default=True, help="Run folder.")
+
+
+def execution_options(command: Command) -> Command:
+    """Add what `batch.run.Execution` takes: workers, timeout, memory, dask."""
+    for option in reversed(_EXECUTION):
+        command = option(command)
+    return command
+
+
+def settings(options: dict[str, Any]) -> dict[str, Any]:
+    """Return `model` and `execution` of a run as the options name them."""
+    from replay.batch.run import Execution
+    from replay.scenario.load import load_model
+
+    execution = Execution(**{name: options[name] for name in ("workers", "timeout", "memory", "dask")})
+    return {"model": load_model(options["model"]) if options["model"] else None, "execution": execution}
 
 
 def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:
@@ -43,3 +78,9 @@ def announce_compiling() -> None:
 def note(message: str) -> None:
     """Write a remark to stderr, where it does not disturb results."""
     click.echo(f"replay: {message}", err=True)
+
+
+def nothing(patterns: Sequence[str]) -> ExitCode:
+    """Say that no scenario is left to work on."""
+    note(f"nothing selected{' by ' if patterns else ''}{', '.join(patterns)}")
+    return ExitCode.NOTHING

@@ -1,31 +1,33 @@
-"""Progress of a run on stderr: a live bar on a terminal, nothing where nobody watches."""
+"""Progress of a run on stderr: live on a terminal, a line for each scenario elsewhere, such as in a nightly's log."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from replay.cli import interruption
 
-Follow = Callable[[int, int], None]
+if TYPE_CHECKING:
+    from replay.batch.case import CaseResult
 
 
 class RunProgress:
-    """One bar for the scenario that runs, named after it; use as a context."""
+    """Counts scenarios done, failed and running, with rate and time left; use as a context."""
 
     def __init__(self) -> None:
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("frames"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-        )
-        console = Console(stderr=True)
-        self._bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._console = Console(stderr=True, highlight=False)
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        self._bars = Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
+        self._all = self._bars.add_task("scenarios", total=None)
+        self._running: dict[str, TaskID] = {}
+        self._costs: dict[str, float] = {}
+        self._done = self._failed = 0
+        self._cost_done = 0.0
+        self._begin: float | None = None
 
     def __enter__(self) -> RunProgress:
         self._bars.start()
@@ -34,13 +36,48 @@ class RunProgress:
     def __exit__(self, *_: object) -> None:
         self._bars.stop()
 
-    def follow(self, name: str, frames: int) -> Follow:
-        """Return what advances a new bar; called with frames computed and all frames."""
+    def plan(self, costs: dict[str, float]) -> None:
+        """Begin to count."""
         interruption.check()
-        bar = self._bars.add_task(name, total=frames)
+        self._costs = costs
+        self._bars.update(self._all, total=len(costs))
 
-        def advance(done: int, total: int) -> None:
-            interruption.check()
-            self._bars.update(bar, completed=done, total=total, visible=done < total)
+    def follow(self, name: str, done: int, total: int) -> None:
+        """Show how far a running scenario is."""
+        interruption.check()
+        self._begin = self._begin or time.monotonic()  # kernels are ready now
+        if name not in self._running:
+            self._running[name] = self._bars.add_task(f"  {escape(name)}", total=None)
+        if total:
+            self._bars.update(self._running[name], completed=done, total=total)
+        self._show()
 
-        return advance
+    def done(self, result: CaseResult) -> None:
+        """Count a scenario."""
+        interruption.check()
+        self._done += 1
+        self._failed += result.status.value != "passed"
+        self._cost_done += self._costs.get(result.name, 0.0)
+        if result.name in self._running:
+            self._bars.remove_task(self._running.pop(result.name))
+        self._bars.update(self._all, completed=self._done)
+        if not self._console.is_terminal and len(self._costs) > 1:
+            state = f"{result.name}: {result.status.value} in {result.seconds:.1f} s"
+            self.tell(f"[{self._done}/{len(self._costs)}] {state}{self._left()}")
+        self._show()
+
+    def tell(self, text: str) -> None:
+        """Say something above the bars."""
+        self._console.print(f"replay: {text}", markup=False, soft_wrap=True)
+
+    def _show(self) -> None:
+        counts = f"scenarios: {self._failed} failed, {len(self._running)} running{self._left()}"
+        self._bars.update(self._all, description=counts)
+
+    def _left(self) -> str:
+        """Return rate and time left, by the expected costs of what is done and what is not."""
+        if self._begin is None or not self._done or self._done >= len(self._costs):
+            return ""
+        seconds = max(time.monotonic() - self._begin, 1e-9)
+        rest = max(sum(self._costs.values()) - self._cost_done, 0.0) / max(self._cost_done, 1e-9) * seconds
+        return f", {60.0 * self._done / seconds:.0f} a minute, about {rest / 60.0:.0f} min left"

@@ -3,58 +3,56 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from replay.cli import options
 from replay.cli.exit_codes import ExitCode
-from replay.cli.options import format_option, note, say, scenarios_argument, select_option
+
+if TYPE_CHECKING:
+    from replay.batch.shard import Shard
 
 
 @click.command()
-@scenarios_argument
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), default=Path("recordings"), show_default=True, help="Run folder."
-)
-@click.option("--model", metavar="FILE|NAME", help="Compute with this model instead of the scenarios' own.")
-@select_option
+@options.scenarios_argument
+@options.output_option("recordings")
+@options.model_option
+@options.select_option
+@options.shard_option
+@options.execution_options
 @click.option("--no-rrd", is_flag=True, help="Record MCAP only.")
 @click.option("--overwrite", is_flag=True, help="Replace recordings that exist.")
-@format_option
+@click.option("--resume", is_flag=True, help="Keep recordings whose inputs and versions are the same; run the others.")
+@options.format_option
 def run(
     scenarios: tuple[Path, ...],
     output: Path,
-    model: str | None,
     patterns: tuple[str, ...],
+    shard: Shard | None,
     no_rrd: bool,
     overwrite: bool,
+    resume: bool,
     form: str,
+    **how: Any,
 ) -> ExitCode:
     """Simulate SCENARIOS (files, folders, or recordings to run again) and record them.
 
-    Each goes to OUTPUT/NAME/NAME.mcap and .rrd; an expectation that does not hold is exit code 4.
+    Each goes to OUTPUT/NAME/NAME.mcap and .rrd. Exit code 4: an expectation does not hold, or a scenario failed.
     """
-    from replay.batch.run import report, run_all
-    from replay.batch.select import load_all, select
+    from replay.batch.run import run_all
+    from replay.batch.select import Selection
     from replay.cli.progress import RunProgress
-    from replay.numerics.jit import is_cache_empty
-    from replay.scenario.load import load_model
+    from replay.cli.results import exit_code, show
 
-    version = load_model(model) if model else None
-    chosen = select(load_all(scenarios), patterns)
+    if overwrite and resume:
+        raise click.UsageError("--overwrite and --resume exclude each other")
+    settings = options.settings(how)
+    chosen = Selection.of(scenarios, patterns, shard).chosen
     if not chosen:
-        note(f"nothing selected by {', '.join(patterns)}")
-        return ExitCode.NOTHING
-    if is_cache_empty():
-        note("compiling kernels; this takes about a minute, once")
-    with RunProgress() as progress:
-        results = run_all(
-            chosen,
-            output,
-            model=version,
-            rrd=not no_rrd,
-            overwrite=overwrite,
-            progress=lambda scenario: progress.follow(scenario.name, scenario.frames),
-        )
-    lines = [line for result in results for line in report(result)]
-    say(form, lambda: "\n".join(lines), lambda: [result.as_json() for result in results])
-    return ExitCode.FINE if all(result.status == "passed" for result in results) else ExitCode.FAILED
+        return options.nothing(patterns)
+    with RunProgress() as watch:
+        flags: dict[str, Any] = {"rrd": not no_rrd, "overwrite": overwrite, "resume": resume}
+        done = run_all(chosen, output, watch=watch, **flags, **settings)
+    show(form, done)
+    return exit_code(done)

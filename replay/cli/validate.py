@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.options import format_option, note, say, scenarios_argument, select_option
+from replay.cli.options import format_option, note, nothing, say, scenarios_argument, select_option
 
 
 @click.command()
@@ -21,8 +21,7 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
 
     chosen = select(load_all(scenarios), patterns)
     if not chosen:
-        note(f"nothing selected by {', '.join(patterns)}")
-        return ExitCode.NOTHING
+        return nothing(patterns)
     lines = [f"{s.name}: valid, {s.frames} frames, {len(s.links)} links" for s in chosen]
     data = [{"scenario": s.name, "frames": s.frames, "links": len(s.links), "tags": list(s.tags)} for s in chosen]
     if deep:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from replay.collision import gjk_exact, gjk_kernel
 from replay.collision.support import Sets
 from replay.errors import InvalidValue
+from replay.numerics.arguments import as_floats
 
 Floats = NDArray[np.float64]
 
@@ -210,11 +211,8 @@ def _exact_shift(a: Floats, b: Floats) -> Floats:
 
 
 def _vertices(name: str, value: ArrayLike) -> Floats:
-    try:
-        points = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidValue(name, value, "must be numbers of shape (n, 3) [m]") from None
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+    points = as_floats(name, value, (None, 3))
+    if len(points) == 0:
         raise InvalidValue(f"{name}.shape", points.shape, "must be (n, 3) with n >= 1")
     _check_finite(name, points)
     return points
@@ -224,12 +222,7 @@ def _pose(name: str, value: ArrayLike | None) -> tuple[Floats | None, Floats]:
     """Return (R or None for the identity, p) of a rigid transform."""
     if value is None:
         return None, np.zeros(3)
-    try:
-        pose = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidValue(name, value, "must be numbers of shape (4, 4)") from None
-    if pose.shape != (4, 4):
-        raise InvalidValue(f"{name}.shape", pose.shape, "must be (4, 4)")
+    pose = as_floats(name, value, (4, 4))
     _check_finite(name, pose)
     rotation, position = pose[:3, :3], pose[:3, 3]
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:

@@ -9,14 +9,32 @@ from typing import Any
 
 from replay.comparison import wording
 from replay.comparison.plots import HEIGHT, LOWER, SHOWN, WIDTH, Plot
-from replay.comparison.runs import RunDifference
+from replay.comparison.runs import Case, RunDifference
 
 
 def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
     """Return the page; `plots` holds the drawings of each case, by its name."""
-    cases = [(case, {plot.signal: plot for plot in plots.get(case.name, ())}) for case in found.cases]
-    page: str = _template("report.html.j2").render(found=found, cases=cases, wording=wording, draw=draw, shown=SHOWN)
+    cases = [(case, plots.get(case.name, ())) for case in found.cases]
+    page: str = _template("report.html.j2").render(
+        found=found, cases=cases, wording=wording, details=details, style=style()
+    )
     return page
+
+
+def style() -> Any:
+    """Return the style sheet of pages that show cases."""
+    from markupsafe import Markup
+
+    return Markup(resources.files("replay.comparison").joinpath("style.css").read_text(encoding="utf-8"))
+
+
+def details(case: Case, plots: Sequence[Plot]) -> Any:
+    """Return what differs in one case, with drawings, as markup that is safe to put into a page."""
+    from markupsafe import Markup
+
+    drawings = {plot.signal: plot for plot in plots}
+    text = _template("case.html.j2").render(case=case, drawings=drawings, wording=wording, draw=draw, shown=SHOWN)
+    return Markup(text)  # rendered with autoescape
 
 
 def draw(plot: Plot) -> Any:

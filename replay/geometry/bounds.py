@@ -14,6 +14,7 @@ from replay.geometry.obb_fit import box_axes
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles
 from replay.geometry.smallest_ball import smallest_ball_centre
+from replay.numerics.arguments import as_floats
 
 __all__ = ["Aabb", "Obb", "Sphere", "aabbs_meet", "fit_aabb", "fit_obb", "fit_sphere", "obbs_meet", "spheres_meet"]
 
@@ -164,18 +165,21 @@ def _signed(axis: Array) -> Array:
 
 
 def _checked(name: str, points: Array) -> Array:
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
-        raise InvalidValue(name, points.shape, "must have shape (n, 3), n >= 1")
+    points = as_floats(name, points, (None, 3))
+    if len(points) == 0:
+        raise InvalidValue(f"{name}.shape", points.shape, "must be (n, 3) with n >= 1")
     if not np.max(np.abs(points)) <= _LARGEST:
         raise InvalidValue(name, "coordinates", f"must be finite and at most {_LARGEST} m")
     return points
 
 
 def _corners(points: Array, triangles: NDArray[np.generic]) -> Array:
-    triangles = np.asarray(triangles)
+    try:
+        triangles = np.asarray(triangles)
+    except ValueError:
+        raise InvalidValue("triangles", triangles, "must be an array of shape (t, 3) or (t, 3, 3)") from None
     if triangles.ndim == 3 and triangles.shape[1:] == (3, 3):
-        return _checked("triangles", triangles.reshape(-1, 3).astype(np.float64)).reshape(-1, 3, 3)
+        return _checked("triangles", triangles.reshape(-1, 3)).reshape(-1, 3, 3)
     if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
         raise InvalidValue("triangles", triangles.shape, "must have shape (t, 3) (indices) or (t, 3, 3) (coordinates)")
     if not np.issubdtype(triangles.dtype, np.integer):

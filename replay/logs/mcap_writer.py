@@ -193,8 +193,21 @@ class McapFileWriter:
             raise InvalidValue(
                 "size of a message", len(data), f"a message in a recording has at most {MAX_CHUNK} bytes"
             )
+        self.packed(channel, time, offsets, data, self._compressor.compress(data))
+
+    def packed(
+        self, channel: int, time: NDArray[np.int64], offsets: NDArray[np.uint64], data: bytes, compressed: bytes
+    ) -> None:
+        """Write message records of one channel, and the same compressed by zstd, as one chunk.
+
+        Args:
+            channel: the channel's id.
+            time: (n,) log times [ns].
+            offsets: (n,) where each record begins in `data`.
+            data: the records.
+            compressed: the same as a zstd frame.
+        """
         start, end = int(time.min()), int(time.max())
-        compressed = self._compressor.compress(data)
         at = self._size
         head = struct.pack("<QQQI", start, end, len(data), zlib.crc32(data))
         head += struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(compressed))

@@ -34,7 +34,7 @@ def record(
     scenario: Scenario,
     directory: str | Path,
     *,
-    model: Model | None = None,
+    model: Model | str | Path | None = None,
     rrd: bool = True,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -44,7 +44,7 @@ def record(
     Args:
         scenario: what `load` returned.
         directory: made when it is not there.
-        model: replaces the scenario's own model.
+        model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
         rrd: whether to make a rerun recording too.
         overwrite: replace recordings that exist; they stay when the run fails.
         progress: called after each block.

@@ -17,6 +17,7 @@ from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
 from replay.scenario.source import Attached, Folder, Library, Provenance, SourceRule, find, problem_at, resolve_name
+from replay.scenario.sweep import Sweep, SweepCase, cases, replaced
 from replay.scenario.yaml_text import parse
 
 VERSION = 1
@@ -29,25 +30,39 @@ def load(path: str | Path) -> Scenario:
         path: of the scenario's YAML file; included files and meshes stand in its folder or below, or in packages.
 
     Returns:
-        The validated scenario; `.sources` holds the bytes of every file read, `.sha256` their digests.
+        The validated scenario; `.sources` holds the bytes of every file read, `.sha256` their digests. Of a file with
+        a sweep it is the scenario whose values no case has replaced; see `load_cases`.
 
     Raises:
         ScenarioError: everything that is wrong, each with file, line, column, and what would work.
     """
-    return _load(Folder(Path(path)))
+    return _File(Folder(Path(path))).scenario()
 
 
-def load_sources(main: str, sources: Mapping[str, bytes]) -> Scenario:
+def load_cases(path: str | Path) -> tuple[Scenario, ...]:
+    """Read the scenarios that a file stands for: one, or one for each case of its sweep.
+
+    Raises:
+        ScenarioError: as `load`, of all cases together.
+    """
+    file = _File(Folder(Path(path)))
+    scenario = file.scenario()
+    return (scenario,) if scenario.sweep is None else file.cases(scenario.name)
+
+
+def load_sources(main: str, sources: Mapping[str, bytes], *, case: str | None = None) -> Scenario:
     """Read a scenario from files in memory, as a recording holds them.
 
     Args:
         main: name of the scenario file in `sources`.
         sources: bytes by name, as `Scenario.sources`.
+        case: name of the case of its sweep; without it, or when it is the scenario's own name, as `load`.
 
     Raises:
-        ScenarioError: as `load`.
+        ScenarioError: as `load`; or there is no such case.
     """
-    return _load(Attached(main, sources))
+    file = _File(Attached(main, sources))
+    return file.scenario() if case is None else file.case(case)
 
 
 def load_model(file_or_name: str | Path) -> Model:
@@ -76,35 +91,82 @@ def load_model(file_or_name: str | Path) -> Model:
         raise ScenarioError(_in_order(translate(error, root, Model))) from None
 
 
-def _load(library: Library) -> Scenario:
-    problems: list[Problem] = []
-    text = Text(library, problems)
-    root = text.read()
-    if root is None:
-        raise ScenarioError(problems)
-    version = root.child("version")
-    if version is not None and (type(version.value) is not int or version.value != VERSION):
-        rule = f"is not known; this release reads version {VERSION} of the language, write version: {VERSION}"
-        raise ScenarioError([problem_at(root, ("version",), rule)])
-    scenario: Scenario | None = None
-    try:
-        scenario = Scenario.model_validate(root.data())
-    except ValidationError as error:
-        problems.extend(translate(error, root, Scenario))
-    problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
-    provenance = Provenance(main=library.main, sources=text.sources, root=root)
-    problems.extend(_read_meshes(library, text, root, provenance))
-    if scenario is None:
-        raise ScenarioError(_in_order(problems))
-    scenario._provenance = provenance
-    if scenario.motion.recorded is not None:
-        problems.extend(_read_log(library, text, root, scenario))
-    if problems:
-        raise ScenarioError(_in_order(problems))
-    problems.extend(motion_problems(scenario))
-    if problems:
-        raise ScenarioError(_in_order(problems))
-    return scenario
+class _File:
+    """A scenario file, read and merged with what it includes: the scenario that it holds, and the cases of its sweep.
+
+    Raises:
+        ScenarioError: nothing of it can be read.
+    """
+
+    def __init__(self, library: Library) -> None:
+        self._library = library
+        self._problems: list[Problem] = []
+        self._text = Text(library, self._problems)
+        root = self._text.read()
+        if root is None:
+            raise ScenarioError(self._problems)
+        version = root.child("version")
+        if version is not None and (type(version.value) is not int or version.value != VERSION):
+            rule = f"is not known; this release reads version {VERSION} of the language, write version: {VERSION}"
+            raise ScenarioError([problem_at(root, ("version",), rule)])
+        self._root = root
+
+    def scenario(self) -> Scenario:
+        """Return the scenario as it is written."""
+        return self._validated(self._root, list(self._problems))
+
+    def cases(self, name: str) -> tuple[Scenario, ...]:
+        """Return the cases of the scenario's sweep."""
+        problems: list[Problem] = []
+        found = []
+        for case in cases(self._root, name):
+            try:
+                found.append(self._case(case))
+            except ScenarioError as error:
+                problems.extend(error.problems)
+        if problems:
+            raise ScenarioError(_in_order(problems))
+        return tuple(found)
+
+    def case(self, name: str) -> Scenario:
+        """Return the case of a name."""
+        title, sweep = self._root.child("name"), self._root.child("sweep")
+        if title is None or not isinstance(title.value, str) or title.value == name or sweep is None:
+            return self.scenario()
+        try:
+            Sweep.model_validate(sweep.data())
+        except ValidationError:
+            return self.scenario()  # which says what is wrong
+        for case in cases(self._root, title.value):
+            if case.name == name:
+                return self._case(case)
+        raise ScenarioError([sweep.place.problem(f"the sweep has no case {name!r}")])
+
+    def _case(self, case: SweepCase) -> Scenario:
+        problems = list(self._problems)
+        root = replaced(self._root, case, problems)
+        return self._validated(root, problems)
+
+    def _validated(self, root: Node, problems: list[Problem]) -> Scenario:
+        scenario: Scenario | None = None
+        try:
+            scenario = Scenario.model_validate(root.data())
+        except ValidationError as error:
+            problems.extend(translate(error, root, Scenario))
+        problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
+        provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
+        problems.extend(_read_meshes(self._library, self._text, root, provenance))
+        if scenario is None:
+            raise ScenarioError(_in_order(problems))
+        scenario._provenance = provenance
+        if scenario.motion.recorded is not None:
+            problems.extend(_read_log(self._library, self._text, root, scenario))
+        if problems:
+            raise ScenarioError(_in_order(problems))
+        problems.extend(motion_problems(scenario))
+        if problems:
+            raise ScenarioError(_in_order(problems))
+        return scenario
 
 
 def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenance) -> list[Problem]:

@@ -16,6 +16,7 @@ from replay.scenario.methods import Model, builtin_model
 from replay.scenario.motion import Motion
 from replay.scenario.sensors import Sensors
 from replay.scenario.source import Provenance
+from replay.scenario.sweep import Sweep
 from replay.scenario.units import Duration, Rate
 
 MAX_FRAMES: Final = 100_000_000
@@ -57,6 +58,8 @@ class Scenario(Fragment):
     """Frames per second [Hz]."""
     duration: Duration
     """Length [s]; frames are at k/rate for k = 0..floor(duration*rate)."""
+    sweep: Sweep | None = None
+    """Cases that replace some values of this scenario."""
     _provenance: Provenance = PrivateAttr(default_factory=Provenance)
 
     @model_validator(mode="after")

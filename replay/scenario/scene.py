@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from replay.kinematics.motion import Script
 from replay.scenario import frames, shapes
 from replay.scenario.expectations import PairExpectation
 from replay.scenario.layout import Layout
+from replay.scenario.load import load_model
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
@@ -110,18 +112,18 @@ class Scene:
         )
 
 
-def build(scenario: Scenario, *, model: Model | None = None) -> Scene:
+def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Scene:
     """Return the scene of a scenario.
 
     Args:
         scenario: as loaded.
-        model: replaces the scenario's own model.
+        model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
 
     Raises:
-        ScenarioError: a mesh cannot be used, a shape needs too many triangles, or an expectation is about a pair that
-            is not tested; each with its place.
+        ScenarioError: a mesh cannot be used, a shape needs too many triangles, an expectation is about a pair that is
+            not tested, or the model's file is not valid; each with its place.
     """
-    model = model or scenario.model
+    model = load_model(model) if isinstance(model, str | Path) else model or scenario.model
     machine = linkage(scenario)
     scene_shapes, notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)

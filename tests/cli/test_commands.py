@@ -15,6 +15,7 @@ import replay.batch.run
 import replay.batch.select
 from replay.cli.exit_codes import ExitCode, worst
 from replay.cli.main import run
+from tests.batch import scenes
 
 SCENARIO = """
 version: 1
@@ -182,24 +183,18 @@ def test_exit_codes_win_in_the_order_of_the_design():
 
 
 def test_a_crash_fails_its_scenario_and_no_other(tmp_path, monkeypatch, capsys):
-    for name in ("first", "second"):
+    for name in ("raise_first", "second"):
         (tmp_path / f"{name}.yaml").write_text(
             SCENARIO.replace("EXPECTED", "never").replace("name: swing", f"name: {name}", 1)
         )
-    build = replay.batch.run.build
-
-    def crashing(scenario, **options):
-        if scenario.name == "first":
-            raise MemoryError("no room for 8 GiB")
-        return build(scenario, **options)
-
-    monkeypatch.setattr(replay.batch.run, "build", crashing)
+    monkeypatch.setattr(replay.batch.run, "run_case", scenes.misbehave)
     assert run(["run", str(tmp_path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FAILED
     text = capsys.readouterr().out
-    assert "first: failed" in text and "crashed: MemoryError: no room for 8 GiB" in text
+    assert "raise_first: crashed" in text and "crashed: MemoryError: no room for 8 GiB" in text
     assert "second: passed" in text
-    assert "Traceback" in (tmp_path / "out" / "first" / "log.txt").read_text()
-    assert sorted(file.name for file in (tmp_path / "out" / "first").iterdir()) == ["log.txt", "result.json"]
+    folder = tmp_path / "out" / "raise_first"
+    assert "Traceback" in (folder / "log.txt").read_text()
+    assert sorted(file.name for file in folder.iterdir()) == ["log.txt", "result.json"]
 
 
 def test_a_fault_of_the_program_never_looks_like_a_difference(scenario, monkeypatch, capsys):
@@ -250,14 +245,14 @@ def test_the_viewer_does_not_outlive_the_command(tmp_path):
 def test_an_interruption_that_native_code_swallows_is_not_lost(scenario, tmp_path):
     code = """if True:
         import os, signal, sys, replay.batch.run as batch
-        build = batch.build
-        def swallowing(scenario, **options):
+        expected_cost = batch.expected_cost
+        def swallowing(scenario):
             try:
                 os.kill(os.getpid(), signal.SIGTERM)
             except KeyboardInterrupt:
                 pass
-            return build(scenario, **options)
-        batch.build = swallowing
+            return expected_cost(scenario)
+        batch.expected_cost = swallowing
         from replay.cli.main import main
         main(sys.argv[1:])
     """

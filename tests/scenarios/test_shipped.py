@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 import replay
-from replay.batch.run import run_case
+from replay.batch.run import run_all
 from replay.batch.select import load_all
 from replay.collision.columns import Level
 from replay.scenario.scene import build
@@ -22,10 +22,9 @@ NAMES = ("carm_clear", "carm_near", "carm_head_contact", "carm_parking", "carm_b
 def runs(tmp_path_factory):
     """Each scenario as run by the command, and its recording read back."""
     folder = tmp_path_factory.mktemp("runs")
-    scenarios = {scenario.name: scenario for scenario in load_all([FOLDER / f"{name}.yaml" for name in NAMES])}
-    results = {name: run_case(scenario, folder, rrd=False) for name, scenario in scenarios.items()}
-    assert [result.status for result in results.values()] == ["passed"] * len(NAMES), results
-    return {name: replay.read(result.recordings.mcap) for name, result in results.items()}
+    run = run_all(load_all([FOLDER / f"{name}.yaml" for name in NAMES]), folder, rrd=False)
+    assert run.passed, run.results
+    return {result.name: replay.read(result.recordings.mcap) for result in run.results}
 
 
 def triangles(scenario: str, shape: str) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arguments import as_float, as_floats
 from replay.sensing.distance.cone import Cone, half_angle
 from replay.sensing.distance.query import closest_of_all
 
@@ -57,11 +58,10 @@ def closest_in_cone(
         (tests/sensing/distance/test_cone_search.py); hit or miss differs only within 1e-12 of grazing.
     Source: derived in `replay.sensing.distance.triangle` and `edge`.
     """
-    corners = _finite("triangles", triangles)
-    if corners.ndim != 3 or corners.shape[1:] != (3, 3):
-        raise InvalidValue("triangles", f"array of shape {corners.shape}", "must have shape (n, 3, 3)")
-    origin = _vector("apex", apex)
+    corners = _finite("triangles", triangles, (None, 3, 3))
+    origin = _finite("apex", apex, (3,))
     direction = unit_axis(axis)
+    aperture, range = as_float("aperture", aperture), as_float("range", range)
     check_aperture(aperture)
     check_range("range", range)
 
@@ -82,7 +82,7 @@ def closest_in_cone(
 
 def unit_axis(axis: ArrayLike) -> tuple[float, float, float]:
     """Return the direction of a vector of any length but zero; InvalidValue otherwise."""
-    vector = _vector("axis", axis)
+    vector = _finite("axis", axis, (3,))
     largest = float(np.max(np.abs(vector)))
     if largest == 0.0:
         raise InvalidValue("axis", vector.tolist(), "must not be the zero vector")
@@ -110,18 +110,8 @@ def _scaled_range(range: float, exponent: int) -> float:
         return math.inf
 
 
-def _vector(name: str, value: ArrayLike) -> Array:
-    vector = _finite(name, value)
-    if vector.shape != (3,):
-        raise InvalidValue(name, f"array of shape {vector.shape}", "must have shape (3,)")
-    return vector
-
-
-def _finite(name: str, value: ArrayLike) -> Array:
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidValue(name, value, "must be an array of numbers") from error
+def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    array = as_floats(name, value, shape)
     if not np.all(np.isfinite(array)):
         raise InvalidValue(name, "an array with NaN or infinity", "must be finite")
     return array

@@ -1,0 +1,79 @@
+"""A run's recordings become the baseline: what that would change, and doing it."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from replay.batch.baseline import Baseline, Entry
+from replay.batch.case import Status
+from replay.comparison import wording
+from replay.comparison.difference import Difference, Verdict
+from replay.comparison.provenance import FILES
+from replay.comparison.runs import diff
+from replay.errors import InvalidValue
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """What accepting a run would change.
+
+    Attributes:
+        baseline: folder.
+        entries: recordings to store, by scenario, each with what is new about it.
+        unchanged: scenarios whose baseline says the same already; it stays.
+    """
+
+    baseline: Baseline
+    entries: dict[str, Entry]
+    unchanged: tuple[str, ...]
+
+    def describe(self) -> list[str]:
+        """Return it as lines for people."""
+        lines = [f"{name}: {entry.what}" for name, entry in self.entries.items()]
+        counts = f"{len(self.entries)} to be accepted, {len(self.unchanged)} unchanged"
+        return [*lines, f"{counts}; baseline {self.baseline.directory}"]
+
+    def commit(self, *, reason: str, now: datetime.datetime) -> None:
+        """Store the recordings; errors as of `Baseline.store`."""
+        if self.entries:
+            self.baseline.store(self.entries, reason=reason, now=now)
+
+
+def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
+    """Return what accepting a run folder would change.
+
+    Raises:
+        InvalidValue: it is no run folder, the run was interrupted, or a scenario of it failed or broke an expectation.
+        RecordingError: a recording cannot be read.
+    """
+    try:
+        run = json.loads((directory / "run.json").read_text(encoding="utf-8"))
+        statuses = {str(name): Status(entry["status"]) for name, entry in run["scenarios"].items()}
+        interrupted = bool(run["interrupted"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise InvalidValue("RUNDIR", directory, "is no run folder: it has no run.json of replay") from None
+    if interrupted:
+        raise InvalidValue("RUNDIR", directory, "holds a run that was interrupted; run it again, or with --resume")
+    failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]
+    if failed:
+        raise InvalidValue("RUNDIR", directory, f"holds scenarios that did not pass: {', '.join(failed)}")
+    accepted = Baseline(baseline)
+    entries, unchanged = {}, []
+    for name in statuses:
+        recording = directory / name / f"{name}.mcap"
+        before = accepted.recording(name)
+        found = None if before is None else diff(before, recording)
+        if found is not None and _same(found):
+            unchanged.append(name)
+        else:
+            entries[name] = Entry(recording, "new" if found is None else wording.summary(found))
+    return Acceptance(accepted, entries, tuple(unchanged))
+
+
+def _same(found: Difference) -> bool:
+    """Return whether nothing but versions differs: not the results, nor the texts and the model that they are of."""
+    inputs = (FILES, "model", "root")
+    return found.verdict is Verdict.SAME and not any(change.name.startswith(inputs) for change in found.provenance)

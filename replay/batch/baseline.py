@@ -1,0 +1,96 @@
+"""The folder of accepted recordings: slim ones by scenario, meshes once, and a log of what was accepted and why."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from replay.errors import WriteError
+from replay.logs.mcap_reader import McapLog
+from replay.recording.reader import read_provenance
+from replay.recording.slim import OBJECTS, write_slim
+
+LOG = "accepted.jsonl"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One recording to be stored: where it is, and what is said of it in the log."""
+
+    recording: Path
+    what: str
+
+
+class Baseline:
+    """A baseline folder: DIR/NAME/NAME.mcap, DIR/objects/SHA256, DIR/accepted.jsonl; it need not be there yet."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+
+    def recording(self, name: str) -> Path | None:
+        """Return a scenario's accepted recording, or None."""
+        path = self._path(name)
+        return path if path.is_file() else None
+
+    def names(self) -> list[str]:
+        """Return the names of all scenarios that have one."""
+        return sorted(path.stem for path in self.directory.glob("*/*.mcap") if path.parent.name == path.stem)
+
+    def store(self, entries: Mapping[str, Entry], *, reason: str, now: datetime.datetime) -> None:
+        """Store recordings by scenario and append what and why to the log.
+
+        All are written first and put in place then, each in one step: at any moment every baseline is wholly the old
+        one or wholly the new one. Meshes that nothing needs any more are removed.
+
+        Raises:
+            RecordingError: a recording cannot be read; nothing is changed then.
+            WriteError: the folder cannot be written.
+        """
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+            staging = Path(tempfile.mkdtemp(prefix=".staging-", dir=self.directory))
+        except OSError as error:
+            raise WriteError(str(self.directory), error.strerror or str(error)) from None
+        try:
+            staged: dict[str, Path] = {}
+            codes: set[str] = set()
+            for name, entry in entries.items():
+                staged[name] = staging / f"{len(staged)}.mcap"
+                write_slim(entry.recording, staged[name], self.directory / OBJECTS)
+                with McapLog(staged[name]) as log:
+                    codes.add(read_provenance(log).code)
+            for name, file in staged.items():
+                self._path(name).parent.mkdir(exist_ok=True)
+                file.replace(self._path(name))
+            line = {
+                "time": now.isoformat(timespec="seconds"),
+                "reason": reason,
+                "code": sorted(codes),
+                "scenarios": {name: entry.what for name, entry in entries.items()},
+            }
+            with (self.directory / LOG).open("a", encoding="utf-8") as log_file:
+                log_file.write(json.dumps(line, ensure_ascii=False) + "\n")
+        except OSError as error:
+            raise WriteError(str(self.directory), error.strerror or str(error)) from None
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+        self._remove_unneeded()
+
+    def _path(self, name: str) -> Path:
+        return self.directory / name / f"{name}.mcap"
+
+    def _remove_unneeded(self) -> None:
+        needed: set[str] = set()
+        for name in self.names():
+            with McapLog(self._path(name)) as log:
+                needed.update(read_provenance(log).files.values())
+        for file in (self.directory / OBJECTS).glob("*"):
+            if file.name not in needed:
+                with contextlib.suppress(OSError):
+                    file.unlink()

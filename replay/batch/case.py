@@ -1,0 +1,164 @@
+"""One scenario run into its folder, and what became of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from replay.errors import ReplayError
+from replay.recording.record import Progress, RecordedPaths
+from replay.scenario.verdict import ExpectationCheck, Outcome
+
+if TYPE_CHECKING:
+    from replay.scenario.methods import Model
+    from replay.scenario.model import Scenario
+    from replay.simulation import FrameBlock
+
+
+class Status(enum.Enum):
+    """What became of a scenario."""
+
+    PASSED = "passed"
+    BROKEN = "broken"  # recorded, but an expectation does not hold
+    FAILED = "failed"  # an error that says why
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+    MEMORY = "memory"
+    INTERRUPTED = "interrupted"  # not run to its end, because the whole run was ended
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there is a whole recording."""
+        return self in (Status.PASSED, Status.BROKEN)
+
+
+@dataclass(frozen=True)
+class CaseOrder:
+    """What a worker needs to run one scenario: its files travel inside the scenario.
+
+    Attributes:
+        scenario: what to run.
+        folder: for its recordings.
+        model: replaces the scenario's own.
+        rrd: whether to make a rerun recording too.
+    """
+
+    scenario: Scenario
+    folder: Path
+    model: Model | None = None
+    rrd: bool = True
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """What became of one scenario.
+
+    Attributes:
+        name: of the scenario.
+        status: passed, or what went wrong.
+        frames: frames computed.
+        outcomes: what became of each expectation.
+        recordings: where they are; None when there are none.
+        error: the one line that says why there are none; "" when there are.
+        counters: what the collision pipeline did, by counter.
+        seconds: wall time.
+        memory: the most resident memory seen [bytes].
+        notes: what a reader should know about the scene.
+        reused: taken from an earlier run.
+    """
+
+    name: str
+    status: Status = Status.PASSED
+    frames: int = 0
+    outcomes: tuple[Outcome, ...] = ()
+    recordings: RecordedPaths | None = None
+    error: str = ""
+    counters: dict[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+    memory: int = 0
+    notes: tuple[str, ...] = ()
+    reused: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what result.json holds: nothing that depends on the machine, the clock or the folder."""
+        return {
+            "scenario": self.name,
+            "status": self.status.value,
+            "frames": self.frames,
+            "error": self.error,
+            "expectations": [
+                {"expectation": outcome.expectation, "passed": outcome.passed, "detail": outcome.detail}
+                for outcome in self.outcomes
+            ],
+            "counters": self.counters,
+            "notes": list(self.notes),
+        }
+
+    @staticmethod
+    def from_json(values: dict[str, Any], recordings: RecordedPaths) -> CaseResult:
+        """Return the result that `as_json` wrote, as one that is reused; KeyError, TypeError or ValueError if none."""
+        return CaseResult(
+            name=values["scenario"],
+            status=Status(values["status"]),
+            frames=values["frames"],
+            outcomes=tuple(Outcome(place=None, **outcome) for outcome in values["expectations"]),
+            recordings=recordings,
+            error=values["error"],
+            counters=values["counters"],
+            notes=tuple(values["notes"]),
+            reused=True,
+        )
+
+
+def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
+    """Run one scenario into its folder and return what became of it; recordings that exist are replaced."""
+    from replay.recording.record import record_blocks
+    from replay.scenario.scene import build
+    from replay.simulation import Simulation
+
+    begin = time.perf_counter()
+    scenario = order.scenario
+    try:
+        scene = build(scenario, model=order.model)
+        simulation = Simulation(scene)
+        check = scene.expectation_check()
+        blocks = _checked(simulation.blocks(), check)
+        recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
+    except ReplayError as error:
+        seconds = time.perf_counter() - begin
+        return CaseResult(scenario.name, Status.FAILED, error=str(error), seconds=seconds)
+    outcomes = tuple(check.finish())
+    return CaseResult(
+        scenario.name,
+        Status.PASSED if all(outcome.passed for outcome in outcomes) else Status.BROKEN,
+        frames=scene.frames,
+        outcomes=outcomes,
+        recordings=recordings,
+        counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
+        seconds=time.perf_counter() - begin,
+        notes=scene.notes,
+    )
+
+
+def describe(result: CaseResult) -> list[str]:
+    """Return a result as lines for people."""
+    if not result.status.recorded:
+        return [f"{result.name}: {result.status.value}", *(f"  {line}" for line in result.error.splitlines())]
+    pace = f" ({result.frames / result.seconds:.0f} a second)" if result.seconds > 0.0 else ""
+    took = "reused" if result.reused else f"in {result.seconds:.1f} s{pace}"
+    lines = [f"{result.name}: {result.status.value}, {result.frames} frames {took}"]
+    for outcome in result.outcomes:
+        lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
+    lines.extend(f"  note: {note}" for note in result.notes)
+    return lines
+
+
+def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
+    for block in blocks:
+        check.update(block.time, block.collision, block.distance, block.capacitive)
+        yield block

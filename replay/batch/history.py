@@ -1,0 +1,71 @@
+"""One line a night: what became of each scenario, so that a report can say since when one fails."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from replay.errors import WriteError
+
+
+@dataclass(frozen=True)
+class Night:
+    """One run: when, by which version, and whether each scenario was fine."""
+
+    time: str
+    version: str
+    verdicts: Mapping[str, str]
+    failing: frozenset[str]
+
+
+def read_history(path: Path) -> list[Night]:
+    """Return all nights in the order of the file; lines that cannot be read, as a crash leaves them, are left out."""
+    nights = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return []
+    except (OSError, UnicodeDecodeError) as error:
+        raise WriteError(str(path), f"it cannot be read before it is appended to: {error}") from None
+    for line in lines:
+        try:
+            entry: dict[str, Any] = json.loads(line)
+            failing = frozenset(entry["failing"])
+            nights.append(Night(str(entry["time"]), str(entry["version"]), dict(entry["verdicts"]), failing))
+        except (KeyError, TypeError, ValueError):
+            continue
+    return nights
+
+
+def append_night(path: Path, night: Night) -> None:
+    """Append a night; WriteError when that is not possible."""
+    entry = {
+        "time": night.time,
+        "version": night.version,
+        "failing": sorted(night.failing),
+        "verdicts": dict(night.verdicts),
+    }
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+    except OSError as error:
+        raise WriteError(str(path), error.strerror or str(error)) from None
+
+
+def failing_since(nights: list[Night], name: str) -> str | None:
+    """Return when the unbroken row of nights in which a scenario failed began; None when it did not fail in the last.
+
+    Nights in which it was not run say nothing about it.
+    """
+    since = None
+    for night in reversed(nights):
+        if name not in night.verdicts:
+            continue
+        if name not in night.failing:
+            break
+        since = night.time
+    return since

@@ -1,0 +1,286 @@
+"""Worker processes that survive their tasks: a task may crash, hang or eat memory, and the others go on.
+
+Workers are fresh interpreters, not forks, so that no state of this process reaches a result. They live long: kernels
+are loaded once a worker and not once a task. The first one prepares itself alone, so that kernels are compiled once;
+no time limit counts before a worker is ready.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import json
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import psutil
+
+from replay.batch.worker import Advanced, Finished, Order, Prepare, Raised, Ready, Start, Told, Work
+from replay.errors import InvalidValue, WorkerError
+
+T = TypeVar("T")
+
+_SECONDS_BETWEEN_CHECKS = 0.1
+_SECONDS_TO_PREPARE = 1800.0  # compiling everything takes minutes on a slow machine; beyond this it hangs
+_FAILED_STARTS = 3
+_BEGIN = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from replay.batch.worker import main; main()"
+
+
+class Ending(enum.Enum):
+    """How a task ended."""
+
+    DONE = "done"
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+    MEMORY = "memory"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One thing to do.
+
+    Attributes:
+        name: in messages.
+        payload: what the work is called with; it is pickled.
+        cost: how long it is expected to take, in any unit; the longest begin first.
+        log: file that gets what the task prints.
+    """
+
+    name: str
+    payload: Any
+    cost: float = 1.0
+    log: Path | None = None
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What became of a task.
+
+    Attributes:
+        task: which.
+        ending: how it ended.
+        value: what the work returned when it was done, else None.
+        reason: one line that says why there is no value; "" when it was done.
+        seconds: wall time.
+        memory: the most resident memory seen [bytes]; 0 when it was too quick to be seen.
+    """
+
+    task: Task
+    ending: Ending
+    value: Any
+    reason: str
+    seconds: float
+    memory: int
+
+
+class Pool:
+    """Runs tasks in worker processes.
+
+    Args:
+        work: importable by name; called with a task's payload and what follows its progress.
+        workers: number of processes.
+        timeout: longest time of one task [s]; None for none.
+        memory: most resident memory of one task with its child processes [bytes]; None for any.
+        prepare: called in each worker before its first task.
+        follow: called with the name of a task, what is done of it and all of it; (name, 0, 0) when it begins.
+        tell: called with remarks for the user.
+
+    Raises:
+        InvalidValue: a limit or the number of workers is not positive.
+    """
+
+    def __init__(
+        self,
+        work: Work,
+        *,
+        workers: int,
+        timeout: float | None = None,
+        memory: int | None = None,
+        prepare: Prepare | None = None,
+        follow: Callable[[str, int, int], None] = lambda name, done, total: None,
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        for name, value in (("workers", workers), ("timeout", timeout), ("memory", memory)):
+            if value is not None and value <= 0:
+                raise InvalidValue(name, value, "must be above 0")
+        self._start = Start(work, prepare)
+        self._count = workers
+        self._timeout = timeout
+        self._memory = memory
+        self._follow = follow
+        self._tell = tell
+
+    def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
+        """Yield what became of each task, in the order in which they end; close the iterator to stop early.
+
+        Raises:
+            WorkerError: workers die before they are ready.
+        """
+        waiting = deque(sorted(tasks, key=lambda task: (-task.cost, task.name)))
+        inbox: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
+        workers: list[_Worker] = []
+        prepared = False
+        failed_starts = 0
+        next_check = 0.0
+        try:
+            while waiting or any(worker.task for worker in workers):
+                wanted = min(self._count, len(waiting) + sum(worker.task is not None for worker in workers))
+                while len(workers) < (wanted if prepared else 1):
+                    workers.append(_Worker(self._start, inbox))
+                for worker in workers:
+                    if worker.ready and worker.task is None and waiting:
+                        worker.give(waiting.popleft())
+                        self._follow(_known(worker.task).name, 0, 0)
+                with contextlib.suppress(queue.Empty):
+                    worker, message = inbox.get(timeout=_SECONDS_BETWEEN_CHECKS)
+                    if worker not in workers:
+                        continue  # it has been stopped; this was still on its way
+                    match message:
+                        case Told(text):
+                            self._tell(text)
+                        case Ready():
+                            worker.ready = prepared = True
+                            failed_starts = 0
+                        case Advanced(done, total):
+                            self._follow(_known(worker.task).name, done, total)
+                        case Finished(value):
+                            yield worker.ended(Ending.DONE, value=value)
+                        case Raised(text):
+                            yield worker.ended(Ending.CRASHED, f"crashed: {text}")
+                        case None:
+                            workers.remove(worker)
+                            worker.stop()
+                            if worker.task is not None:
+                                yield worker.ended(Ending.CRASHED, f"crashed: {worker.cause_of_death()}")
+                            else:
+                                failed_starts += 1
+                                if failed_starts == _FAILED_STARTS:
+                                    raise WorkerError(worker.cause_of_death())
+                if time.monotonic() >= next_check:
+                    for worker in list(workers):
+                        found = worker.broken_limit(self._timeout, self._memory)
+                        if found is None:
+                            continue
+                        workers.remove(worker)
+                        worker.stop()
+                        if worker.task is not None:
+                            yield worker.ended(*found)
+                    next_check = time.monotonic() + _SECONDS_BETWEEN_CHECKS
+        finally:
+            for worker in workers:
+                worker.stop()
+
+
+class _Worker:
+    """A worker process as the pool sees it."""
+
+    def __init__(self, start: Start, inbox: queue.SimpleQueue[tuple[_Worker, Any]]) -> None:
+        self.task: Task | None = None
+        self.ready = False
+        self._memory = 0
+        self._began = time.monotonic()
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _BEGIN, json.dumps(sys.path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is for the pool, which then ends its workers itself
+        )
+        self._watched = psutil.Process(self._process.pid)
+        threading.Thread(target=self._listen, args=(inbox,), name="replay-pool", daemon=True).start()
+        self._send(start)
+
+    def give(self, task: Task) -> None:
+        """Begin a task."""
+        self.task = task
+        self._began = time.monotonic()
+        self._memory = 0
+        self._send(Order(task.payload, task.log))
+
+    def ended(self, ending: Ending, reason: str = "", *, value: Any = None) -> Ended:
+        """Return what became of the task; the worker is free then."""
+        task, self.task = _known(self.task), None
+        return Ended(task, ending, value, reason, time.monotonic() - self._began, self._memory)
+
+    def broken_limit(self, timeout: float | None, memory: int | None) -> tuple[Ending, str] | None:
+        """Return which limit the worker is beyond, and how to say it; a free worker that is too large counts too."""
+        seconds = time.monotonic() - self._began
+        if not self.ready:
+            return (Ending.TIMEOUT, "") if seconds > _SECONDS_TO_PREPARE else None
+        used = self._resident()
+        self._memory = max(self._memory, used)
+        if memory is not None and used > (memory if self.task else memory / 2):
+            return (
+                Ending.MEMORY,
+                f"stopped: {used / 2**20:.0f} MiB of memory are above the limit {memory / 2**20:.0f} MiB",
+            )
+        if self.task and timeout is not None and seconds > timeout:
+            return Ending.TIMEOUT, f"stopped: still running after the time limit of {timeout:g} s"
+        return None
+
+    def stop(self) -> None:
+        """End the process and all that it started, and wait until they are gone."""
+        family = []
+        with contextlib.suppress(psutil.Error):
+            family = self._watched.children(recursive=True)
+        if os.name == "posix":  # its session also holds the children that it has left behind by dying
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        for process in family:
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+        self._process.kill()
+        self._process.wait()
+        with contextlib.suppress(OSError):
+            _known(self._process.stdin).close()
+
+    def cause_of_death(self) -> str:
+        """Return how the process ended, which it did by itself."""
+        code = self._process.wait()
+        if code >= 0:
+            return f"the process ended itself with exit code {code}"
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+        hint = "; the system may have run out of memory" if name == "SIGKILL" else ""
+        return f"the process was ended by {name}{hint}"
+
+    def _resident(self) -> int:
+        try:
+            family = [self._watched, *self._watched.children(recursive=True)]
+        except psutil.Error:
+            return 0
+        used = 0
+        for process in family:
+            with contextlib.suppress(psutil.Error):
+                used += process.memory_info().rss
+        return used
+
+    def _send(self, message: object) -> None:
+        stream = _known(self._process.stdin)
+        with contextlib.suppress(OSError):  # its death is noticed by `_listen`
+            stream.write(pickle.dumps(message))
+            stream.flush()
+
+    def _listen(self, inbox: queue.SimpleQueue[tuple[_Worker, Any]]) -> None:
+        stream = _known(self._process.stdout)
+        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError), stream:
+            while True:
+                inbox.put((self, pickle.load(stream)))
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=5.0)  # so that its exit code is its own and not that of `stop`
+        inbox.put((self, None))
+
+
+def _known(value: T | None) -> T:
+    assert value is not None
+    return value

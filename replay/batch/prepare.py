@@ -1,0 +1,87 @@
+"""Kernels compiled before anything is timed: a small scene that needs all that the scenarios of a run need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from replay.scenario.methods import Model
+from replay.scenario.model import Scenario
+
+_SCENE = b"""
+version: 1
+name: prepare
+rate: 10 Hz
+duration: 0.9 s
+links:
+  table:
+    shapes:
+      top: {type: cuboid, size: [1, 1, 0.1]}
+      ball: {type: sphere, radius: 0.2, pose: {xyz: [0, 0, -0.5]}}
+      sheet: {type: plane, size: [0.5, 0.5], pose: {xyz: [0, 0.8, 0.3]}}
+  bow:
+    parent: table
+    joint: {type: revolute, axis: [0, 1, 0], lower: -3, upper: 3}
+    shapes: {bow: {type: arc, radius: 1, span: 3, width: 0.1, thickness: 0.1, chord_error: 0.01}}
+  tool:
+    parent: bow
+    joint: {type: prismatic, axis: [0, 0, 1], lower: -2, upper: 2, velocity: 1, acceleration: 9}
+    shapes: {can: {type: cylinder, radius: 0.1, height: 0.3}, tip: {type: cone, radius: 0.1, height: 0.2}}
+  guest:
+    joint: {type: free}
+    shapes: {body: {type: sphere, radius: 0.3, chord_error: 0.2 mm}}
+motion:
+  points: {bow: [{time: 0, position: -1}, {time: 0.9, position: 1}]}
+  moves: [{to: {tool: 0.5}, speed: 1}]
+  free: {guest: [{time: 0, xyz: [2, 0, 0]}, {time: 0.9, xyz: [0, 0, 0.5]}]}
+collision: {pairs: PAIRS, margin: 0.2}
+sensors: {SENSORS}
+"""
+_DISTANCE = "distance: {eye: {link: tool, pose: {rpy: [3.1, 0, 0]}, aperture: 1, range: 3}}"
+_CAPACITIVE = "capacitive: {guard: {link: tool, plates: {a: {size: [0.1, 0.1]}}, coupling: 10 pF}}"
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What scenarios compute, and by which methods; limits that do not change what is compiled are left out."""
+
+    model: Model
+    collision: bool
+    distance: bool
+    capacitive: bool
+
+
+def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs, ...]:
+    """Return what scenarios need, each combination once."""
+    found = {
+        (scenario.collision.pairs == "all", bool(scenario.sensors.distance), bool(scenario.sensors.capacitive), name): (
+            version
+        )
+        for scenario in scenarios
+        for version in [model or scenario.model]
+        for name in [version.model_dump_json()]
+    }
+    return tuple(Needs(version, *parts) for (*parts, _), version in found.items())
+
+
+@dataclass(frozen=True)
+class PrepareKernels:
+    """What a worker calls before its first scenario: compiles kernels, or loads those that are compiled already."""
+
+    needs: tuple[Needs, ...]
+
+    def __call__(self, tell: Callable[[str], None]) -> None:
+        """Run the small scene with each combination of methods."""
+        from replay.numerics.jit import is_cache_empty
+        from replay.scenario.load import load_sources
+        from replay.simulation import simulate
+
+        if is_cache_empty():
+            tell("compiling kernels; this takes about a minute, once")
+        for needs in self.needs:
+            sensors = [text for text, used in ((_DISTANCE, needs.distance), (_CAPACITIVE, needs.capacitive)) if used]
+            text = _SCENE.replace(b"PAIRS", b"all" if needs.collision else b"none")
+            text = text.replace(b"{SENSORS}", f"{{{', '.join(sensors)}}}".encode())
+            scenario = load_sources("prepare.yaml", {"prepare.yaml": text})
+            for _ in simulate(scenario, model=needs.model):
+                pass

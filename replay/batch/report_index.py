@@ -1,0 +1,88 @@
+"""A regression as one page: counts, then scenarios, failing ones first, each with what differs and how to see it."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import replay
+from replay.batch.regress import Judged, Regression, Verdict
+from replay.comparison import report_html
+
+_FILES = ("{name}.mcap", "{name}.rrd", "{name}.difference.rrd", "log.txt", "result.json")
+_ORDER = [verdict for verdict in Verdict if not verdict.fine] + [verdict for verdict in Verdict if verdict.fine]
+_OPEN = 3
+"""As many failing scenarios are shown open; more of them would hide one another."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scenario on the page.
+
+    Attributes:
+        item: the scenario.
+        since: when the row of failing nights began; "" when this is the first.
+        links: text and address of its files.
+        command: what reproduces it, for a shell.
+    """
+
+    item: Judged
+    since: str
+    links: tuple[tuple[str, str], ...]
+    command: str
+
+
+def index(found: Regression, since: Mapping[str, str]) -> str:
+    """Return the page; it needs no other file, no network and no script.
+
+    Args:
+        found: the regression.
+        since: when the row of failing nights began, by scenario.
+    """
+    ordered = sorted(found.judged, key=lambda item: (_ORDER.index(item.verdict), item.name))
+    rows = [Row(item, since.get(item.name, ""), _links(found, item), command(found, item)) for item in ordered]
+    failing = [row for row in rows if not row.item.verdict.fine]
+    page: str = _template().render(
+        found=found,
+        rows=rows,
+        failing=len(failing),
+        counts=[(verdict, found.count(verdict)) for verdict in _ORDER if found.count(verdict)],
+        open=len(failing) <= _OPEN,
+        style=report_html.style(),
+        details=report_html.details,
+        version=replay.__version__,
+        host=platform.node(),
+    )
+    return page
+
+
+def command(found: Regression, item: Judged) -> str:
+    """Return the command that runs and compares one scenario again."""
+    parts = ["replay", "regress", item.source or "SCENARIOS", "--select", item.name]
+    parts += ["--baseline", str(found.baseline), "-o", "again"]
+    parts += [*(["--rules", found.rules] if found.rules else []), *(["--model", found.model] if found.model else [])]
+    return shlex.join(parts)
+
+
+def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
+    folder = found.run.directory / item.name
+    names = [name.format(name=item.name) for name in _FILES]
+    links = [(name, f"{quote(item.name)}/{quote(name)}") for name in names if (folder / name).is_file()]
+    if item.comparison is not None:
+        links.append(("baseline", Path(item.comparison.baseline).resolve().as_uri()))
+    return tuple(links)
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+    return environment.from_string(resources.files("replay.batch").joinpath("index.html.j2").read_text("utf-8"))

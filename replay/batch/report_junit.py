@@ -1,0 +1,81 @@
+"""A regression as a JUnit report: failed when it differs, an error when there is no result, skipped when filtered."""
+
+from __future__ import annotations
+
+import platform
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import replay
+from replay.batch.regress import Judged, Regression, Verdict
+from replay.comparison.report_text import text
+from replay.comparison.runs import RunDifference
+
+SUITE = "replay.regress"
+FAILURES = (Verdict.DIFFERENT, Verdict.BROKEN, Verdict.MISSING)
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(found: Regression) -> bytes:
+    """Return the report as UTF-8 XML that is valid by the schema of Apache Ant's reports."""
+    failures = found.count(*FAILURES)
+    skipped = sum(item.verdict.left_out for item in found.judged)
+    fine = sum(item.verdict.fine for item in found.judged)
+    root = ElementTree.Element("testsuites")
+    suite = ElementTree.SubElement(
+        root,
+        "testsuite",
+        {
+            "id": "0",
+            "package": "replay",
+            "name": SUITE,
+            "timestamp": found.run.started.strftime("%Y-%m-%dT%H:%M:%S"),
+            "hostname": _clean(platform.node()) or "localhost",
+            "tests": str(len(found.judged)),
+            "failures": str(failures),
+            "errors": str(len(found.judged) - fine - failures),
+            "skipped": str(skipped),
+            "time": f"{found.run.seconds:.3f}",
+        },
+    )
+    properties = ElementTree.SubElement(suite, "properties")
+    for name, value in (
+        ("replay", replay.__version__),
+        ("baseline", str(found.baseline)),
+        ("rules", found.rules or "none"),
+        ("unused baselines", ", ".join(found.unused)),
+    ):
+        ElementTree.SubElement(properties, "property", {"name": name, "value": _clean(value)})
+    for item in found.judged:
+        _case(suite, found, item)
+    for name in ("system-out", "system-err"):
+        ElementTree.SubElement(suite, name)
+    ElementTree.indent(root)
+    xml: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return xml + b"\n"
+
+
+def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
+    seconds = 0.0 if item.result is None else item.result.seconds
+    attributes = {"name": _clean(item.name), "classname": SUITE, "time": f"{seconds:.3f}"}
+    case = ElementTree.SubElement(suite, "testcase", attributes)
+    if item.verdict.left_out:
+        ElementTree.SubElement(case, "skipped", {"message": _clean(item.message)})
+    elif not item.verdict.fine:
+        tag = "failure" if item.verdict in FAILURES else "error"
+        problem = ElementTree.SubElement(case, tag, {"message": _clean(item.message), "type": item.verdict.value})
+        problem.text = _clean(_details(found, item))
+
+
+def _details(found: Regression, item: Judged) -> str:
+    if item.comparison is not None and item.verdict is Verdict.DIFFERENT:
+        return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
+    log = Path(found.run.directory) / item.name / "log.txt"
+    return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])
+
+
+def _clean(value: str) -> str:
+    """Return text without the characters that XML cannot hold, not even escaped."""
+    return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", value)

@@ -1,0 +1,66 @@
+"""The files of a regression: junit.xml, index.html, run.json, and a line of history."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import replay
+from replay.batch.history import Night, append_night, failing_since, read_history
+from replay.batch.regress import Regression, verdicts
+from replay.batch.report_index import index
+from replay.batch.report_junit import junit
+from replay.batch.run import as_json, write
+
+HISTORY = "history.jsonl"
+
+
+def write_reports(found: Regression, *, history: Path | None = None) -> None:
+    """Write all files into the run folder; a run that was interrupted is no night of the history.
+
+    Args:
+        found: the regression.
+        history: where nights are kept; RUNDIR/history.jsonl when left out.
+
+    Raises:
+        WriteError: a file cannot be written.
+    """
+    history = history or found.run.directory / HISTORY
+    nights = read_history(history)
+    failing = frozenset(item.name for item in found.judged if not item.verdict.fine)
+    earlier = {name: failing_since(nights, name) for name in failing}
+    since = {name: time for name, time in earlier.items() if time is not None}
+    started = found.run.started.isoformat(timespec="seconds")
+    if not found.run.interrupted:
+        append_night(history, Night(started, replay.__version__, verdicts(found), failing))
+    directory = found.run.directory
+    summary = {
+        **as_json(found.run),
+        "baseline": str(found.baseline),
+        "rules": found.rules,
+        "model": found.model,
+        "verdicts": {
+            item.name: {
+                "verdict": item.verdict.value,
+                **({"message": item.message} if item.message else {}),
+                **({"since": since.get(item.name, started)} if item.name in failing else {}),
+            }
+            for item in found.judged
+        },
+        "unused_baselines": list(found.unused),
+    }
+    write(directory / "run.json", json.dumps(summary, indent=1) + "\n")
+    write(directory / "junit.xml", junit(found).decode())
+    write(directory / "index.html", index(found, since))
+
+
+def describe(found: Regression) -> list[str]:
+    """Return the outcome as lines for people: what needs attention, then counts."""
+    failing = [item for item in found.judged if not item.verdict.fine]
+    lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
+    lines += [f"unused baseline: {name}" for name in found.unused]
+    counts = {verdict: found.count(verdict) for verdict in dict.fromkeys(item.verdict for item in found.judged)}
+    lines.append(
+        f"{len(found.judged)} scenarios: " + ", ".join(f"{n} {verdict.value}" for verdict, n in counts.items())
+    )
+    return lines

@@ -1,0 +1,165 @@
+"""The worker's side of the pool: a process of its own that prepares itself once and then does one task after another.
+
+It talks to the pool over its standard input and output, which it puts out of everybody's reach first: whatever a task
+prints, in Python or in native code, goes to the task's log, and so does the trace of a crash.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import os
+import pickle
+import queue
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+Follow = Callable[[int, int], None]
+"""Called with what is done of a task and all of it."""
+Work = Callable[[Any, Follow], Any]
+"""What a worker does with the payload of a task."""
+Prepare = Callable[[Callable[[str], None]], None]
+"""What a worker does before its first task; called with what tells the user something."""
+
+_SECONDS_BETWEEN_MESSAGES = 0.2
+
+
+@dataclass(frozen=True)
+class Start:
+    """The pool's first message: what this worker is for."""
+
+    work: Work
+    prepare: Prepare | None
+
+
+@dataclass(frozen=True)
+class Order:
+    """A task: its payload, and the file for what it prints."""
+
+    payload: Any
+    log: Path | None
+
+
+@dataclass(frozen=True)
+class Told:
+    """A remark for the user while the worker prepares itself."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The worker is prepared."""
+
+
+@dataclass(frozen=True)
+class Advanced:
+    """How far the task is."""
+
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What the task returned."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Raised:
+    """The task ended in an exception: its one line; the log has all of it."""
+
+    text: str
+
+
+def main() -> None:
+    """Work until the pool closes the connection; it does so too when it dies."""
+    orders, answers = _channels()
+    faulthandler.enable()
+    inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(orders, inbox), name="replay-orders", daemon=True).start()
+
+    def answer(message: object) -> None:
+        answers.write(pickle.dumps(message))
+        answers.flush()
+
+    start: Start = inbox.get()
+    if start.prepare is not None:
+        try:
+            start.prepare(lambda text: answer(Told(text)))
+        except Exception as error:  # a task that has the same trouble will say so itself
+            answer(Told(f"a worker could not prepare itself: {error!r}"))
+    answer(Ready())
+    while True:
+        order: Order = inbox.get()
+        with _printing_to(order.log):
+            try:
+                message: object = Finished(start.work(order.payload, _throttled(answer)))
+            except Exception as error:
+                traceback.print_exc()
+                message = Raised(f"{type(error).__name__}: {error}")
+        answer(message)
+
+
+def _channels() -> tuple[BinaryIO, BinaryIO]:
+    """Keep the connection to the pool as private descriptors; nothing else can read or write it from here on."""
+    orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for standard in (0, 1, 2):
+        os.dup2(nothing, standard)
+    os.close(nothing)
+    return orders, answers
+
+
+def _receive(orders: BinaryIO, inbox: queue.SimpleQueue[Any]) -> None:
+    """Take orders in a thread, so that the pool's death ends this process in the middle of a task too."""
+    try:
+        while True:
+            inbox.put(pickle.load(orders))
+    except BaseException:
+        os._exit(0)
+
+
+def _throttled(answer: Callable[[object], None]) -> Follow:
+    last = 0.0
+
+    def follow(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _SECONDS_BETWEEN_MESSAGES:
+            last = now
+            answer(Advanced(done, total))
+
+    return follow
+
+
+@contextlib.contextmanager
+def _printing_to(log: Path | None) -> Iterator[None]:
+    """Let everything that is printed go to a file, and to nowhere afterwards."""
+    _flush()
+    target = os.open(os.devnull if log is None else log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    for standard in (1, 2):
+        os.dup2(target, standard)
+    os.close(target)
+    try:
+        yield
+    finally:
+        _flush()
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        for standard in (1, 2):
+            os.dup2(nothing, standard)
+        os.close(nothing)
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()

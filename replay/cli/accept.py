@@ -1,0 +1,37 @@
+"""`replay accept`: make a run's recordings the baseline."""
+
+from __future__ import annotations
+
+import datetime
+import sys
+from pathlib import Path
+
+import click
+
+from replay.cli.exit_codes import ExitCode
+from replay.cli.options import note
+
+
+@click.command()
+@click.argument("rundir", type=click.Path(path_type=Path))
+@click.option("--baseline", type=click.Path(path_type=Path), required=True, help="Folder of accepted recordings.")
+@click.option("--reason", default="", help="Why the results are right now; kept in the baseline's log.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
+    """Show how the recordings of RUNDIR differ from the baseline, and make them the baseline.
+
+    A run that was interrupted or has a scenario that failed is refused.
+    """
+    from replay.batch.accept import plan_acceptance
+
+    plan = plan_acceptance(rundir, baseline)
+    click.echo("\n".join(plan.describe()))
+    if not plan.entries:
+        return ExitCode.FINE
+    if not yes and not sys.stdin.isatty():
+        raise click.UsageError("there is nobody to ask; pass --yes")
+    if not yes and not click.confirm("Accept?", err=True):
+        note("nothing was changed")
+        return ExitCode.DIFFERENT
+    plan.commit(reason=reason, now=datetime.datetime.now(datetime.UTC))
+    return ExitCode.FINE

@@ -1,0 +1,61 @@
+"""`replay regress`: run scenarios and compare each with its baseline."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from typing import Any
+
+import click
+
+from replay.cli import options
+from replay.cli.exit_codes import ExitCode
+
+FILE = click.Path(path_type=Path)
+
+
+@click.command()
+@options.scenarios_argument
+@click.option("--baseline", type=FILE, required=True, help="Folder of accepted recordings; see `replay accept`.")
+@options.output_option("regress")
+@click.option("--rules", type=FILE, help="Tolerances; rules.yaml beside SCENARIOS when left out.")
+@click.option("--missing-baseline", "missing", type=click.Choice(["fail", "create", "skip"]), default="fail")
+@click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
+@click.option("--history", type=FILE, help="File that each night appends to; OUTPUT/history.jsonl when left out.")
+@options.model_option
+@options.select_option
+@options.shard_option
+@options.execution_options
+def regress(
+    scenarios: tuple[Path, ...],
+    baseline: Path,
+    output: Path,
+    rules: Path | None,
+    history: Path | None,
+    patterns: tuple[str, ...],
+    shard: Any,
+    **how: Any,
+) -> ExitCode:
+    """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
+
+    Exit codes: 1 something differs; 4 a scenario failed or has no baseline; 130 interrupted (the reports are partial).
+    """
+    from replay.batch.regress import regress as judge
+    from replay.batch.reports import describe, write_reports
+    from replay.batch.select import Selection, rules_beside
+    from replay.cli.progress import RunProgress
+    from replay.cli.results import regression_code
+    from replay.comparison.rules_file import read_rules
+
+    settings = options.settings(how)
+    selection = Selection.of(scenarios, patterns, shard)
+    if not selection.chosen:
+        return options.nothing(patterns)
+    rules = rules or rules_beside(scenarios)
+    settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
+    settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
+    with RunProgress() as watch:
+        found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
+        write_reports(found, history=history)
+    click.echo("\n".join([*describe(found), f"report: {output / 'index.html'}"]))
+    return regression_code(found)

@@ -1,0 +1,43 @@
+"""A run's results on stdout, and the exit code that they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from replay.cli.exit_codes import ExitCode, worst
+from replay.cli.options import say
+
+if TYPE_CHECKING:
+    from replay.batch.case import CaseResult
+    from replay.batch.regress import Regression
+    from replay.batch.run import Run
+
+
+def show(form: str, run: Run) -> None:
+    """Write what became of each scenario, and where its recordings are."""
+    from replay.batch.case import describe
+
+    def text(result: CaseResult) -> str:
+        found = result.recordings
+        paths = [f"  {path}" for path in (found.mcap, found.rrd) if path] if found else []
+        return "\n".join([*describe(result), *paths])
+
+    say(form, lambda: "\n".join(map(text, run.results)), lambda: [result.as_json() for result in run.results])
+
+
+def exit_code(run: Run) -> ExitCode:
+    """Return what the shell is told of a run."""
+    interrupted = ExitCode.INTERRUPTED if run.interrupted else ExitCode.FINE
+    return worst([interrupted, ExitCode.FINE if run.passed else ExitCode.FAILED])
+
+
+def regression_code(found: Regression) -> ExitCode:
+    """Return what the shell is told of a regression."""
+    return worst([exit_code_of(item.verdict.name) for item in found.judged])
+
+
+def exit_code_of(verdict: str) -> ExitCode:
+    """Return the exit code of one scenario's verdict."""
+    codes = {"DIFFERENT": ExitCode.DIFFERENT, "INTERRUPTED": ExitCode.INTERRUPTED, "UNREADABLE": ExitCode.INVALID}
+    fine = ("SAME", "CREATED", "UNCOMPARED", "SKIPPED")
+    return ExitCode.FINE if verdict in fine else codes.get(verdict, ExitCode.FAILED)

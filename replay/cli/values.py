@@ -1,0 +1,53 @@
+"""Values of options as people write them: amounts of memory, times, shards."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import click
+
+_MEMORY_UNITS = {"MB": 10**6, "GB": 10**9, "MiB": 2**20, "GiB": 2**30}
+_TIME_UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+class Memory(click.ParamType[int]):
+    """An amount of memory with its unit, as bytes."""
+
+    name = "SIZE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return bytes."""
+        found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]+)", str(value))
+        if found is None or found[2] not in _MEMORY_UNITS or float(found[1]) == 0.0:
+            self.fail(f"{value!r} is no amount of memory; write one such as 2GiB ({', '.join(_MEMORY_UNITS)})")
+        return int(float(found[1]) * _MEMORY_UNITS[found[2]])
+
+
+class Seconds(click.ParamType[float]):
+    """A time, as seconds."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return seconds."""
+        found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([a-z]*)", str(value))
+        if found is None or found[2] not in _TIME_UNITS or float(found[1]) == 0.0:
+            self.fail(f"{value!r} is no time; write seconds, or one such as 90s, 10min, 1h")
+        return float(found[1]) * _TIME_UNITS[found[2]]
+
+
+class ShardOf(click.ParamType[Any]):
+    """One of several parts of the scenarios."""
+
+    name = "i/n"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the shard."""
+        from replay.batch.shard import Shard
+        from replay.errors import InvalidValue
+
+        try:
+            return Shard.parse(str(value))
+        except InvalidValue as error:
+            self.fail(str(error))

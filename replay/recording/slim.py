@@ -1,0 +1,127 @@
+"""Slim recordings: complete but for the meshes, which stand once by SHA-256 in a folder that many recordings share.
+
+A slim recording is a recording like any other, readable by the same readers and equal to the whole one in every
+message; only the attachments that are no text are missing, and its provenance still names their digests.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from replay.errors import RecordingError
+from replay.logs.mcap_chunks import records, unpack
+from replay.logs.mcap_reader import McapLog
+from replay.logs.mcap_records import PREAMBLE, RECORD_HEAD, Chunk, Op
+from replay.logs.mcap_writer import McapFileWriter
+from replay.logs.part_file import PartFile
+from replay.recording.provenance import sha256
+from replay.recording.reader import read_provenance
+
+OBJECTS = "objects"
+"""Name of the folder that holds the files of slim recordings by SHA-256; it stands above them."""
+
+_TEXTS = (".yaml", ".yml")
+
+
+def write_slim(recording: Path, target: Path, objects: Path) -> tuple[str, ...]:
+    """Write a recording without its meshes, and the meshes by their digests.
+
+    Args:
+        recording: a whole recording.
+        target: the slim one; replaced when it exists.
+        objects: folder for the meshes; one that is there already stays.
+
+    Returns:
+        The digests of the meshes that the recording needs.
+
+    Raises:
+        RecordingError: the recording cannot be read.
+        WriteError: a file cannot be written.
+    """
+    needed = []
+    with McapLog(recording) as log:
+        file = PartFile(target, overwrite=True)
+        try:
+            writer = McapFileWriter(file, log.library)
+            for name, values in log.metadata:
+                if name != PREAMBLE:
+                    writer.metadata(name, values)
+            for attachment in log.attachments:
+                data = log.attachment(attachment)
+                if PurePosixPath(attachment.name).suffix.lower() in _TEXTS:
+                    writer.attachment(attachment.name, attachment.media_type, data)
+                else:
+                    needed.append(_put(data, objects))
+            for _, schema in sorted(log.schemas.items()):
+                writer.schema(schema)
+            for _, channel in sorted(log.channels.items()):
+                writer.channel(channel.topic, channel.schema_id)
+            writer.end_preamble()
+            for chunk in log.chunks:
+                _copy(log, chunk, writer)
+            writer.finish()
+            file.commit()
+        except BaseException:
+            file.discard()
+            raise
+    return tuple(sorted(needed))
+
+
+def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
+    """Return a recording's scenario: its name, its main file's name, and every file that it needs.
+
+    Files that a slim recording lacks are taken from the folder `objects` that stands in one of the folders above it.
+
+    Raises:
+        RecordingError: the recording cannot be read, or a file is not there or not the one that was used.
+    """
+    with McapLog(recording) as log:
+        provenance = read_provenance(log)
+        files = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
+    for name, digest in provenance.files.items():
+        if name not in files:
+            files[name] = _object(recording, name, digest)
+    return provenance.scenario, provenance.root, files
+
+
+def _put(data: bytes, objects: Path) -> str:
+    digest = sha256(data)
+    if not (objects / digest).is_file():
+        file = PartFile(objects / digest, overwrite=True)
+        file.write(data)
+        file.commit()
+    return digest
+
+
+def _object(recording: Path, name: str, digest: str) -> bytes:
+    places = [folder / OBJECTS / digest for folder in recording.absolute().parents]
+    place = next((place for place in places if place.is_file()), None)
+    if place is None:
+        raise RecordingError(str(recording), f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}")
+    data = place.read_bytes()
+    if sha256(data) != digest:
+        raise RecordingError(str(place), "damaged: its SHA-256 is not its name")
+    return data
+
+
+def _copy(log: McapLog, chunk: Chunk, writer: McapFileWriter) -> None:
+    with log.path.open("rb") as file:
+        file.seek(chunk.begin)
+        packed = file.read(chunk.compressed_size)
+    data = unpack(str(log.path), chunk, packed)
+    messages = np.array(list(_messages(str(log.path), data)), dtype=np.int64).reshape(-1, 3)
+    if chunk.compression != "zstd" or not len(messages) or len(np.unique(messages[:, 0])) != 1:
+        raise RecordingError(str(log.path), "is not laid out as replay writes recordings")
+    writer.packed(int(messages[0, 0]), messages[:, 1], messages[:, 2].astype(np.uint64), data, packed)
+
+
+def _messages(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield channel, log time [ns] and offset of each message record."""
+    for op, begin, _ in records(file, data):
+        if op == Op.MESSAGE:
+            channel, _, time = struct.unpack_from("<HIQ", data, begin)
+            yield channel, time, begin - RECORD_HEAD

@@ -1,0 +1,114 @@
+"""Accepted recordings: slim, complete together with their meshes, replaced whole, and logged."""
+
+import datetime
+import json
+
+import pytest
+
+import replay
+from replay.batch.baseline import Baseline, Entry
+from replay.batch.history import Night, append_night, failing_since, read_history
+from replay.batch.select import load_all
+from replay.comparison.runs import diff
+from replay.errors import RecordingError
+from replay.geometry import primitives
+from replay.recording.slim import attached_files
+
+NOW = datetime.datetime(2027, 3, 1, 2, 0, tzinfo=datetime.UTC)
+TEXT = """
+version: 1
+name: {name}
+rate: 5 Hz
+duration: 1 s
+links:
+  ball: {{joint: {{type: free}}, shapes: {{ball: {{type: mesh, file: ball.stl, scale: 1}}}}}}
+  wall: {{shapes: {{slab: {{type: cube, size: 1}}}}}}
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    import trimesh
+
+    folder = tmp_path_factory.mktemp("meshes")
+    solid = primitives.sphere(0.5, 0.01)
+    mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(solid.triangles))
+    (folder / "ball.stl").write_bytes(mesh.export(file_type="stl"))
+    for name in ("a", "b"):
+        (folder / f"{name}.yaml").write_text(TEXT.format(name=name))
+        replay.record(replay.load(folder / f"{name}.yaml"), folder / name, rrd=False)
+    return folder
+
+
+def entries(run, *names):
+    return {name: Entry(run / name / f"{name}.mcap", "new") for name in names}
+
+
+def test_slim_recordings_share_their_meshes_and_say_all_that_the_whole_ones_do(run, tmp_path):
+    baseline = Baseline(tmp_path / "base")
+    baseline.store(entries(run, "a", "b"), reason="first", now=NOW)
+    assert baseline.names() == ["a", "b"]
+    (mesh,) = (tmp_path / "base" / "objects").iterdir()
+    assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
+    slim, whole = baseline.recording("a"), run / "a" / "a.mcap"
+    assert slim.stat().st_size < whole.stat().st_size - mesh.stat().st_size
+    found = diff(slim, whole)
+    assert found.verdict.value == "same"
+    assert not found.provenance
+    assert not found.scene
+    assert attached_files(slim) == attached_files(whole)
+    (scenario,) = load_all([slim])
+    again = replay.record(scenario, tmp_path / "again", rrd=False)
+    assert again.mcap.read_bytes() == whole.read_bytes()
+
+
+def test_what_and_why_is_logged_and_unneeded_meshes_go(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    (tmp_path / "objects" / ("0" * 64)).write_bytes(b"left over")
+    baseline.store(entries(run, "a"), reason="näher", now=NOW)
+    log = [json.loads(line) for line in (tmp_path / "accepted.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert [line["reason"] for line in log] == ["first", "näher"]
+    assert log[1]["scenarios"] == {"a": "new"}
+    assert len(list((tmp_path / "objects").iterdir())) == 1
+    assert not list(tmp_path.glob(".staging*"))
+
+
+def test_nothing_changes_when_one_of_them_cannot_be_stored(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    before = baseline.recording("a").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes((run / "b" / "b.mcap").read_bytes()[:-100])
+    with pytest.raises(RecordingError):
+        baseline.store({**entries(run, "a"), "b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW)
+    assert baseline.names() == ["a"]
+    assert baseline.recording("a").read_bytes() == before
+    assert len((tmp_path / "accepted.jsonl").read_text().splitlines()) == 1
+
+
+def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    (mesh,) = (tmp_path / "objects").iterdir()
+    mesh.write_bytes(b"x")
+    with pytest.raises(RecordingError, match="SHA-256 is not its name"):
+        attached_files(baseline.recording("a"))
+    mesh.unlink()
+    with pytest.raises(RecordingError, match="neither attached nor in a folder 'objects'"):
+        attached_files(baseline.recording("a"))
+
+
+def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
+    path = tmp_path / "history.jsonl"
+    for day, verdicts in enumerate(
+        ({"a": "different"}, {"a": "same"}, {"a": "crashed"}, {"b": "same"}, {"a": "timeout"})
+    ):
+        failing = frozenset(name for name, verdict in verdicts.items() if verdict != "same")
+        append_night(path, Night(f"day {day}", "1", verdicts, failing))
+    with path.open("a") as file:
+        file.write('{"time": "cut')
+    nights = read_history(path)
+    assert len(nights) == 5
+    assert failing_since(nights, "a") == "day 2"
+    assert failing_since(nights, "b") is None
+    assert failing_since([], "a") is None

@@ -1,0 +1,80 @@
+"""A local Dask cluster: the same verdicts and the same bytes as without, also when one of its workers is killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from replay.batch.case import Status
+from replay.batch.run import Execution, Unwatched, run_all
+from replay.errors import WorkerError
+from tests.batch import scenes
+from tests.batch.test_run import files_of
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Yield the scheduler's address and the pids of two workers."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DASK_DISTRIBUTED__SCHEDULER__WORK_STEALING": "False"}
+    address = tmp_path / "scheduler.json"
+    options = {"cwd": tmp_path, "env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+
+    def dask(name, *more):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{name}", "--scheduler-file", str(address), *more]
+        return subprocess.Popen(command, **options)
+
+    scheduler = dask("scheduler", "--port", "0", "--no-dashboard")
+    common = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path))
+    workers = [dask("worker", *common) for _ in range(2)]
+    try:
+        while not address.is_file():
+            time.sleep(0.1)
+            assert scheduler.poll() is None
+        yield json.loads(address.read_text())["address"], workers
+    finally:
+        for process in (*workers, scheduler):
+            family = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
+            process.kill()
+            process.wait()
+            for member in family:
+                member.kill()
+
+
+def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    address, workers = cluster
+    names = ["crash", "hang", *(f"good_{k}" for k in range(4))]
+    scenarios = [scenes.scene(name) for name in names]
+
+    class Killer(Unwatched):
+        def done(self, result):
+            if result.name.startswith("good") and workers[0].poll() is None:
+                workers[0].send_signal(signal.SIGKILL)
+
+    limits = {"timeout": 6.0, "memory": 2 << 30}
+    there = tmp_path / "there"
+    run = run_all(scenarios, there, rrd=False, execution=Execution(dask=address, **limits), watch=Killer())
+    statuses = {result.name: result.status for result in run.results}
+    assert statuses.pop("crash") is Status.CRASHED
+    assert statuses.pop("hang") is Status.TIMEOUT
+    assert set(statuses.values()) == {Status.PASSED}
+    assert workers[0].wait() == -signal.SIGKILL
+    assert "about to crash" in (there / "crash" / "log.txt").read_text()
+    here = tmp_path / "here"
+    run_all(scenarios, here, rrd=False, execution=Execution(workers=2, **limits))
+    assert files_of(there) == files_of(here)
+    assert all(result.recordings is None or result.recordings.mcap.is_file() for result in run.results)
+
+
+def test_a_scheduler_that_does_not_answer_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_CONNECT", 1)
+    with pytest.raises(WorkerError, match="does not answer"):
+        run_all([scenes.scene("a")], tmp_path, execution=Execution(dask="tcp://127.0.0.1:9"))

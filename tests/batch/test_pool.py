@@ -1,0 +1,95 @@
+"""Tasks that crash, hang, eat memory or leave children do not disturb the others."""
+
+import contextlib
+import time
+
+import psutil
+import pytest
+
+from replay.batch.pool import Ending, Pool, Task
+from replay.errors import InvalidValue
+from tests.batch.tasks import behave, slow_start
+
+
+def run(tasks, **options):
+    options = {"workers": 2, **options}
+    return {ended.task.name: ended for ended in Pool(behave, **options).run(tasks)}
+
+
+def children():
+    return {process.pid for process in psutil.Process().children(recursive=True)}
+
+
+def test_each_task_ends_as_it_must_and_the_others_go_on(tmp_path):
+    before = children()
+    child = tmp_path / "child"
+    left = tmp_path / "left"
+    bad = {
+        "raise": ("raise", "no"),
+        "exit": ("exit", 3),
+        "segfault": ("segfault", None),
+        "hang": ("hang with a child", child),
+        "eat": ("eat", None),
+        "leave": ("leave a child", left),
+    }
+    tasks = [Task(name, payload, cost=2.0, log=tmp_path / f"{name}.txt") for name, payload in bad.items()]
+    tasks += [Task(f"good{k}", ("return", k)) for k in range(5)]
+    ended = run(tasks, timeout=2.0, memory=300 << 20)
+    assert {name: e.ending for name, e in ended.items()} == {
+        "raise": Ending.CRASHED,
+        "exit": Ending.CRASHED,
+        "segfault": Ending.CRASHED,
+        "hang": Ending.TIMEOUT,
+        "eat": Ending.MEMORY,
+        "leave": Ending.CRASHED,
+        **{f"good{k}": Ending.DONE for k in range(5)},
+    }
+    assert [ended[f"good{k}"].value for k in range(5)] == list(range(5))
+    assert ended["raise"].reason == "crashed: ValueError: no"
+    assert "exit code 3" in ended["exit"].reason
+    assert "SIGSEGV" in ended["segfault"].reason
+    assert "time limit of 2 s" in ended["hang"].reason
+    assert "above the limit 300 MiB" in ended["eat"].reason
+    assert ended["eat"].memory > 300 << 20
+    assert "doing segfault" in (tmp_path / "segfault.txt").read_text()
+    assert "Fatal Python error" in (tmp_path / "segfault.txt").read_text()
+    assert "ValueError: no" in (tmp_path / "raise.txt").read_text()
+    assert children() == before
+    for file in (child, left):
+        assert not psutil.pid_exists(int(file.read_text())) or is_dead(int(file.read_text()))
+
+
+def is_dead(pid):
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    return True
+
+
+def test_time_limits_count_from_the_moment_a_worker_is_ready():
+    said = []
+    ended = run([Task("a", ("return", 1))], workers=1, timeout=0.5, prepare=slow_start, tell=said.append)
+    assert ended["a"].ending is Ending.DONE
+    assert ended["a"].seconds < 0.5
+    assert said == ["preparing"]
+
+
+def test_workers_live_long_and_the_longest_task_begins_first():
+    ended = run([Task(f"t{k}", ("pid", None), cost=k) for k in range(4)], workers=1)
+    assert len({e.value for e in ended.values()}) == 1
+    assert list(ended) == ["t3", "t2", "t1", "t0"]
+
+
+def test_closing_the_iterator_ends_every_process():
+    before = children()
+    tasks = [Task("quick", ("return", 0), cost=2.0), *(Task(f"hang{k}", ("hang", None)) for k in range(3))]
+    endings = Pool(behave, workers=2).run(tasks)
+    assert next(endings).task.name == "quick"
+    begin = time.monotonic()
+    endings.close()
+    assert time.monotonic() - begin < 5.0
+    assert children() == before
+
+
+def test_limits_must_be_positive():
+    with pytest.raises(InvalidValue, match="timeout = 0"):
+        Pool(behave, workers=1, timeout=0)

@@ -1,0 +1,156 @@
+"""Runs of many scenarios: verdicts, files, resuming, shards, and Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from replay.batch.case import Status
+from replay.batch.cost import expected_cost
+from replay.batch.run import Execution, Unwatched, run_all
+from replay.batch.shard import Shard
+from replay.errors import InvalidValue, RecordingExistsError
+from replay.scenario.methods import BUILTIN_MODELS
+from tests.batch import scenes
+
+TWO = Execution(workers=2)
+
+
+def files_of(folder):
+    names = ("*.mcap", "result.json")
+    return {file.relative_to(folder): file.read_bytes() for name in names for file in sorted(folder.rglob(name))}
+
+
+class Remarks(Unwatched):
+    def __init__(self):
+        self.said = []
+
+    def tell(self, text):
+        self.said.append(text)
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ran")
+    run_all([scenes.scene(f"good{k}", duration=k + 1) for k in range(3)], folder, rrd=False, execution=TWO)
+    return folder
+
+
+def test_files_are_the_same_bytes_whatever_the_number_of_workers(ran, tmp_path):
+    scenarios = [scenes.scene(f"good{k}", duration=k + 1) for k in range(3)]
+    run_all(scenarios, tmp_path, rrd=False, execution=Execution(workers=1))
+    assert files_of(tmp_path) == files_of(ran)
+    assert len(files_of(ran)) == 6
+
+
+def test_failures_are_told_apart_and_the_others_are_recorded(tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    before = {process.pid for process in psutil.Process().children(recursive=True)}
+    scenarios = [scenes.scene(name) for name in ("good", "crash", "hang", "eat")]
+    scenarios.append(scenes.scene("broken", contact="always"))
+    (tmp_path / "crash").mkdir()
+    (tmp_path / "crash" / "crash.mcap").write_bytes(b"of last night")
+    limits = Execution(workers=2, timeout=3.0, memory=600 << 20)
+    run = run_all(scenarios, tmp_path, rrd=False, overwrite=True, execution=limits)
+    assert {result.name: result.status for result in run.results} == {
+        "good": Status.PASSED,
+        "crash": Status.CRASHED,
+        "hang": Status.TIMEOUT,
+        "eat": Status.MEMORY,
+        "broken": Status.BROKEN,
+    }
+    assert not run.passed
+    assert (tmp_path / "crash" / "log.txt").read_text().splitlines()[:2] == ["about to crash", "crash: crashed"]
+    assert not (tmp_path / "crash" / "crash.mcap").exists()
+    summary = json.loads((tmp_path / "run.json").read_text())
+    assert summary["scenarios"]["hang"]["error"] == "stopped: still running after the time limit of 3 s"
+    assert summary["scenarios"]["eat"]["memory"] > 600 << 20
+    assert json.loads((tmp_path / "eat" / "result.json").read_text())["status"] == "memory"
+    assert {process.pid for process in psutil.Process().children(recursive=True)} == before
+
+
+@pytest.mark.soak
+def test_kernels_are_all_compiled_before_the_first_scenario(tmp_path):
+    """In an empty cache, which takes minutes."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    prepare = "PrepareKernels(needs_of([scene('a')], None))(print)"
+    simulate = "[block for block in replay.simulate(scene('a'))]"
+    counts = []
+    for code in (prepare, f"{prepare}; {simulate}"):
+        head = "import replay; from replay.batch.prepare import PrepareKernels, needs_of"
+        head += "; from tests.batch.scenes import scene"
+        subprocess.run([sys.executable, "-c", f"{head}; {code}"], check=True, env=environment, capture_output=True)
+        counts.append(len(list(tmp_path.rglob("*.nb[ic]"))))
+    assert counts[0] == counts[1] > 20
+
+
+def test_resuming_reuses_what_is_still_valid_and_says_why_it_runs_the_rest(ran, tmp_path):
+    scenarios = [scenes.scene(f"good{k}", duration=k + 1) for k in range(3)]
+    run_all(scenarios, tmp_path, rrd=False, execution=TWO)
+    wanted = files_of(tmp_path)
+    damaged = bytearray((tmp_path / "good2" / "good2.mcap").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "good2" / "good2.mcap").write_bytes(damaged)
+    scenarios[1] = scenes.scene("good1", duration=2, distance=1.3)
+    remarks = Remarks()
+    run = run_all(scenarios, tmp_path, rrd=False, resume=True, execution=TWO, watch=remarks)
+    assert [result.reused for result in run.results] == [True, False, False]
+    assert remarks.said[0] == "good0: reused"
+    assert remarks.said[1] == "good1: runs again: changed: file good1.yaml"
+    assert remarks.said[2].startswith("good2: runs again: damaged")
+    again = files_of(tmp_path)
+    assert {str(name) for name in wanted if wanted[name] != again[name]} == {"good1/good1.mcap"}
+    model = BUILTIN_MODELS["thesis2015"]
+    run = run_all(scenarios[:1], tmp_path, rrd=False, resume=True, model=model, execution=TWO, watch=remarks)
+    assert remarks.said[3].startswith("good0: runs again: changed: model ")
+
+
+def test_recordings_are_kept_unless_told_otherwise(ran):
+    with pytest.raises(RecordingExistsError):
+        run_all([scenes.scene("good0")], ran)
+
+
+def test_shards_are_all_scenarios_each_once_and_about_equally_long():
+    scenarios = [scenes.scene(f"s{k}", duration=d) for k, d in enumerate((1, 100, 1, 90, 5, 5, 7))]
+    shards = [Shard(k, 3).of(scenarios) for k in (1, 2, 3)]
+    assert sorted(s.name for shard in shards for s in shard) == sorted(s.name for s in scenarios)
+    assert {"s1", "s3"} not in [{s.name for s in shard} for shard in shards]
+    assert expected_cost(scenarios[1]) > expected_cost(scenarios[3])
+    for wrong in ("0/2", "3/2", "1", "a/b"):
+        with pytest.raises(InvalidValue, match="must be i/n"):
+            Shard.parse(wrong)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal as a terminal does")
+def test_ctrl_c_ends_cleanly_with_a_partial_report_and_no_process_left(tmp_path):
+    scenes.write(tmp_path / "in", "good")
+    scenes.write(tmp_path / "in", "hang", duration=0.5)
+    code = (
+        "import replay.batch.run as run, sys; from tests.batch import scenes; from replay.cli.main import main;"
+        "run.run_case = scenes.misbehave; main(sys.argv[1:])"
+    )
+    out = tmp_path / "out"
+    arguments = ["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd", "--workers", "1"]
+    process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE, text=True)
+    while not (out / "good" / "result.json").exists():
+        time.sleep(0.05)
+        assert process.poll() is None
+    time.sleep(0.3)
+    family = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=20)
+    assert process.returncode == 130, error
+    assert "Traceback" not in error
+    assert family
+    assert not any(member.is_running() for member in family)
+    summary = json.loads((out / "run.json").read_text())
+    assert summary["interrupted"] is True
+    assert {name: entry["status"] for name, entry in summary["scenarios"].items()} == {
+        "good": "passed",
+        "hang": "interrupted",
+    }

@@ -1,0 +1,186 @@
+"""A night as CI sees it: verdicts, exit codes, reports, and how results are accepted."""
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import psutil
+import pytest
+import xmlschema
+
+from replay.batch.baseline import Baseline
+from replay.cli.exit_codes import ExitCode
+from replay.cli.main import run
+from tests.batch import scenes
+
+XSD = Path(__file__).parents[1] / "data" / "junit.xsd"
+LIMITS = ["--workers", "2", "--timeout", "4s", "--memory", "600MiB"]
+
+
+def verdicts_of(folder):
+    return {name: entry["verdict"] for name, entry in json.loads((folder / "run.json").read_text())["verdicts"].items()}
+
+
+def junit_of(folder):
+    """Return the verdicts of a valid junit.xml: pass, failure, error or skipped by name."""
+    xmlschema.XMLSchema(XSD).validate(str(folder / "junit.xml"))
+    (suite,) = ElementTree.parse(folder / "junit.xml").getroot()
+    cases = {case.get("name"): (case[0].tag if len(case) else "pass") for case in suite.iter("testcase")}
+    for tag, attribute in (("failure", "failures"), ("error", "errors"), ("skipped", "skipped")):
+        assert int(suite.get(attribute)) == list(cases.values()).count(tag)
+    assert int(suite.get("tests")) == len(cases)
+    return cases
+
+
+def night(folder, output, *more):
+    base = ["--baseline", str(folder / "base"), "-o", str(output)]
+    return run(["regress", str(folder / "in"), *base, *LIMITS, *map(str, more)])
+
+
+def prepare(folder, plain, bad, differing):
+    """Write scenarios and accept them as they are; then change those that are to differ."""
+    names = [f"{kind}_{k}" for kind, count in [("plain", plain), ("differ", differing)] for k in range(count)]
+    for name in names:
+        scenes.write(folder / "in", name)
+    assert night(folder, folder / "first", "--rrd", "none") is ExitCode.FAILED  # there are no baselines yet
+    assert set(verdicts_of(folder / "first").values()) == {"missing baseline"}
+    assert run(["accept", str(folder / "first"), "--baseline", str(folder / "base"), "--yes", "--reason", "ok"]) == 0
+    for k in range(differing):
+        scenes.write(folder / "in", f"differ_{k}", distance=1.25)
+    for kind in ("crash", "hang", "eat"):
+        for k in range(bad):
+            scenes.write(folder / "in", f"{kind}_{k}")
+
+
+def check_night(tmp_path, monkeypatch, *, plain, bad, differing):
+    before = {process.pid for process in psutil.Process().children(recursive=True)}
+    prepare(tmp_path, plain, bad, differing)
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    out = tmp_path / "night"
+    assert night(tmp_path, out) is ExitCode.FAILED
+    counted = {"plain": "same", "differ": "different", "crash": "crashed", "hang": "timeout", "eat": "memory"}
+    found = verdicts_of(out)
+    assert found == {name: counted[name.split("_")[0]] for name in found}
+    assert len(found) == plain + 3 * bad + differing
+    tags = {"same": "pass", "different": "failure"}
+    assert junit_of(out) == {name: tags.get(verdict, "error") for name, verdict in found.items()}
+    assert {process.pid for process in psutil.Process().children(recursive=True)} == before
+    for kind in ("crash", "hang", "eat"):
+        for k in range(bad):
+            (tmp_path / "in" / f"{kind}_{k}.yaml").unlink()
+    assert night(tmp_path, out) is ExitCode.DIFFERENT
+    return out
+
+
+def test_a_night_gives_exactly_the_verdicts_of_its_scenarios(tmp_path, monkeypatch, capsys):
+    out = check_night(tmp_path, monkeypatch, plain=3, bad=1, differing=2)
+    text = capsys.readouterr().out
+    assert "differ_0: different: " in text
+    assert "5 scenarios: 2 different, 3 same" in text
+    assert (out / "differ_0" / "differ_0.rrd").is_file()
+    assert (out / "differ_0" / "differ_0.difference.rrd").is_file()
+    assert not list(out.glob("plain*/*.rrd"))
+    nights = (out / "history.jsonl").read_text().splitlines()
+    assert len(nights) == 2
+    summary = json.loads((out / "run.json").read_text())
+    assert summary["verdicts"]["differ_1"]["since"] == json.loads(nights[0])["time"]
+    assert summary["host"]
+    page = (out / "index.html").read_text()
+    assert f"since {json.loads(nights[0])['time']}" in page
+    assert page.index("differ_0") < page.index("plain_0")
+    command = re.search("<pre class=.mono.>(replay regress .*--select differ_0 .*)</pre>", page)[1]
+    again = command.split()[1:]
+    again[again.index("-o") + 1] = str(tmp_path / "again")
+    assert run(again) is ExitCode.DIFFERENT
+
+
+@pytest.mark.soak
+def test_a_night_of_two_hundred(tmp_path, monkeypatch):
+    check_night(tmp_path, monkeypatch, plain=175, bad=5, differing=10)
+
+
+def test_filters_missing_and_unused_baselines(tmp_path, capsys):
+    for name in ("a", "b", "c"):
+        scenes.write(tmp_path / "in", name)
+    out = tmp_path / "out"
+    assert night(tmp_path, out, "--select", "a", "--missing-baseline", "skip", "--rrd", "none") is ExitCode.FINE
+    assert verdicts_of(out) == {"a": "no baseline", "b": "skipped", "c": "skipped"}
+    assert set(junit_of(out).values()) == {"skipped"}
+    assert night(tmp_path, out, "--shard", "1/3", "--missing-baseline", "create", "--rrd", "all") is ExitCode.FINE
+    assert sorted(verdicts_of(out).values()) == ["created", "skipped", "skipped"]
+    (made,) = Baseline(tmp_path / "base").names()
+    assert (out / made / f"{made}.rrd").is_file()
+    (tmp_path / "in" / f"{made}.yaml").unlink()
+    capsys.readouterr()
+    assert night(tmp_path, out, "--missing-baseline", "skip", "--rrd", "none") is ExitCode.FINE
+    assert f"unused baseline: {made}" in capsys.readouterr().out
+    assert f"<li><code>{made}</code>" in (out / "index.html").read_text()
+    assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
+
+
+def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
+    scenes.write(tmp_path / "in", "a")
+    scenes.write(tmp_path / "in", "b")
+    out, base = tmp_path / "out", tmp_path / "base"
+    accept = ["accept", str(out), "--baseline", str(base)]
+    assert run(["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd"]) is ExitCode.FINE
+    assert run([*accept, "--yes", "--reason", "first"]) is ExitCode.FINE
+    assert run([*accept, "--yes"]) is ExitCode.FINE
+    assert "0 to be accepted, 2 unchanged" in capsys.readouterr().out
+    scenes.write(tmp_path / "in", "a", distance=1.3)
+    assert run(["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd", "--overwrite"]) is ExitCode.FINE
+    assert run(accept) is ExitCode.INVALID
+    assert "nobody to ask" in capsys.readouterr().err
+    assert run([*accept, "--yes", "--reason", "the wall was moved"]) is ExitCode.FINE
+    assert re.search("^a: .*signals changed", capsys.readouterr().out, re.MULTILINE)
+    log = [json.loads(line) for line in (base / "accepted.jsonl").read_text().splitlines()]
+    assert [(line["reason"], list(line["scenarios"])) for line in log] == [
+        ("first", ["a", "b"]),
+        ("the wall was moved", ["a"]),
+    ]
+    assert night(tmp_path, tmp_path / "night", "--rrd", "none") is ExitCode.FINE
+    scenes.write(tmp_path / "in", "b", contact="always")
+    assert night(tmp_path, tmp_path / "night", "--rrd", "none") is ExitCode.FAILED
+    assert verdicts_of(tmp_path / "night")["b"] == "broken"
+    assert run(["accept", str(tmp_path / "night"), "--baseline", str(base), "--yes"]) is ExitCode.INVALID
+    assert "did not pass: b (broken)" in capsys.readouterr().err
+    summary = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps({**summary, "interrupted": True}))
+    assert run([*accept, "--yes"]) is ExitCode.INVALID
+    assert "interrupted" in capsys.readouterr().err
+    assert run(["accept", str(tmp_path), "--baseline", str(base)]) is ExitCode.INVALID
+
+
+def test_rules_beside_the_scenarios_are_the_default(tmp_path):
+    scenes.write(tmp_path / "in", "a")
+    assert night(tmp_path, tmp_path / "out", "--missing-baseline", "create", "--rrd", "none") is ExitCode.FINE
+    scenes.write(tmp_path / "in", "a", distance=1.2000001)
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.DIFFERENT
+    rules = tmp_path / "in" / "rules.yaml"
+    rules.write_text("rules_version: 1\nrules: [{signals: '*', abs: 1e-3, ignore: true, reason: rounding}]\n")
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.FINE
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["rules"] == str(rules)
+
+
+def test_names_and_messages_are_shown_and_not_run(tmp_path):
+    scenes.write(tmp_path / "in", "x")
+    path = tmp_path / "in" / "x.yaml"
+    path.write_text(path.read_text().replace("name: x", "name: '<script>alert(1)<script>'"))
+    assert night(tmp_path, tmp_path / "out") is ExitCode.FAILED
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+    assert list(junit_of(tmp_path / "out")) == ["<script>alert(1)<script>"]
+
+
+def test_a_sweep_is_run_case_by_case_and_a_case_again_from_its_recording(tmp_path):
+    path = scenes.write(tmp_path / "in", "s")
+    path.write_text(path.read_text() + 'sweep: {grid: {"sensors.distance.tip.aperture": [10 deg, 20 deg]}}\n')
+    out = tmp_path / "out"
+    assert run(["run", str(path), "-o", str(out), "--no-rrd"]) is ExitCode.FINE
+    name = "s[aperture=20deg]"
+    assert sorted(folder.name for folder in out.iterdir() if folder.is_dir()) == ["s[aperture=10deg]", name]
+    recording = out / name / f"{name}.mcap"
+    assert run(["run", str(recording), "-o", str(tmp_path / "again"), "--no-rrd", "--select", name]) is ExitCode.FINE
+    assert (tmp_path / "again" / name / f"{name}.mcap").read_bytes() == recording.read_bytes()
