@@ -179,7 +179,7 @@ def _corners(points: Array, triangles: NDArray[np.generic]) -> Array:
     except ValueError:
         raise InvalidValue("triangles", triangles, "must be an array of shape (t, 3) or (t, 3, 3)") from None
     if triangles.ndim == 3 and triangles.shape[1:] == (3, 3):
-        return _checked("triangles", triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+        return _checked("triangles", as_floats("triangles", triangles, (None, 3, 3)).reshape(-1, 3)).reshape(-1, 3, 3)
     if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
         raise InvalidValue("triangles", triangles.shape, "must have shape (t, 3) (indices) or (t, 3, 3) (coordinates)")
     if not np.issubdtype(triangles.dtype, np.integer):

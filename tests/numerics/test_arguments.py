@@ -42,7 +42,7 @@ def test_what_is_not_one_real_number(value):
         as_float("x", value)
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 @pytest.mark.parametrize(
     "call",
     [
