@@ -75,8 +75,8 @@ class Row:
         return 1e6 * self.median
 
 
-LEAST_ROUND = 2e-3
-"""[s] A contender that is faster is called several times a round: a pause of the machine must not look like its time."""
+LEAST_ROUND = 5e-4
+"""[s] A contender that is faster is called several times a round; long rounds would all meet a pause of the machine."""
 
 
 def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> list[Row]:
@@ -138,11 +138,14 @@ def absent(case: str, method: str, why: str) -> Row:
 
 
 def ratio(rows: Sequence[Row], case: str, slower: str, faster: str) -> float:
-    """Return how many times faster one method is than another in a case; NaN if either is absent or failed."""
+    """Return how many times faster one method is than another in a case; NaN if either is absent or failed.
+
+    The fastest rounds are compared: other programs can only add time, and on a busy machine they do so in most rounds.
+    """
     found = {row.method: row for row in rows if row.case == case}
     if slower not in found or faster not in found or found[faster].failed:
         return math.nan
-    return found[slower].median / found[faster].median
+    return found[slower].low / found[faster].low
 
 
 @dataclass(frozen=True)
