@@ -75,6 +75,10 @@ class Row:
         return 1e6 * self.median
 
 
+LEAST_ROUND = 5e-4
+"""[s] A contender that is faster is called several times a round; long rounds would all meet a pause of the machine."""
+
+
 def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> list[Row]:
     """Time contenders against each other on one case.
 
@@ -86,12 +90,11 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
         one row a contender, in the order given; `low` and `high` are the fastest and slowest round.
     """
     checks = [contender.check(contender.run()) for contender in contenders]
+    calls = [max(1, math.ceil(LEAST_ROUND / max(_seconds(contender, 1), 1e-9))) for contender in contenders]
     times: list[list[float]] = [[] for _ in contenders]
     for _ in range(rounds):
-        for contender, taken in zip(contenders, times, strict=True):
-            begin = time.perf_counter()
-            contender.run()
-            taken.append((time.perf_counter() - begin) / contender.queries)
+        for contender, count, taken in zip(contenders, calls, times, strict=True):
+            taken.append(_seconds(contender, count) / (count * contender.queries))
     return [
         Row(
             case=case,
@@ -111,6 +114,13 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
     ]
 
 
+def _seconds(contender: Contender, calls: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(calls):
+        contender.run()
+    return time.perf_counter() - begin
+
+
 def exponent(points: Sequence[tuple[float, float]]) -> float:
     """Return p of the law y ~ x^p fitted to points (x, y) by least squares in the logarithms; NaN below two points."""
     if len(points) < 2:
@@ -128,11 +138,14 @@ def absent(case: str, method: str, why: str) -> Row:
 
 
 def ratio(rows: Sequence[Row], case: str, slower: str, faster: str) -> float:
-    """Return how many times faster one method is than another in a case; NaN if either is absent or failed."""
+    """Return how many times faster one method is than another in a case; NaN if either is absent or failed.
+
+    The fastest rounds are compared: other programs can only add time, and on a busy machine they do so in most rounds.
+    """
     found = {row.method: row for row in rows if row.case == case}
     if slower not in found or faster not in found or found[faster].failed:
         return math.nan
-    return found[slower].median / found[faster].median
+    return found[slower].low / found[faster].low
 
 
 @dataclass(frozen=True)
