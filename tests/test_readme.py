@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import replay
-from replay.batch.run import run_case
-from replay.cli.main import COMMANDS
+from replay.cli.exit_codes import ExitCode
+from replay.cli.main import COMMANDS, run
 
 ROOT = Path(replay.__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -21,7 +21,7 @@ def blocks(language: str) -> list[str]:
 def test_the_first_scenario_runs_and_its_expectations_hold(tmp_path):
     path = tmp_path / "reach.yaml"
     path.write_text(next(block for block in blocks("yaml") if "version: 1" in block))
-    assert run_case(replay.load(path), tmp_path / "out", rrd=False).status == "passed"
+    assert run(["run", str(path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FINE
 
 
 def test_every_file_it_points_to_is_there():

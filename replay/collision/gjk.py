@@ -213,7 +213,7 @@ def _exact_shift(a: Floats, b: Floats) -> Floats:
 def _vertices(name: str, value: ArrayLike) -> Floats:
     points = as_floats(name, value, (None, 3))
     if len(points) == 0:
-        raise InvalidValue(f"{name}.shape", points.shape, "must be (n, 3) with n >= 1")
+        raise InvalidValue(name, "no points", "must have shape (n, 3) with n >= 1")
     _check_finite(name, points)
     return points
 

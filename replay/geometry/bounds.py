@@ -167,7 +167,7 @@ def _signed(axis: Array) -> Array:
 def _checked(name: str, points: Array) -> Array:
     points = as_floats(name, points, (None, 3))
     if len(points) == 0:
-        raise InvalidValue(f"{name}.shape", points.shape, "must be (n, 3) with n >= 1")
+        raise InvalidValue(name, "no points", "must have shape (n, 3) with n >= 1")
     if not np.max(np.abs(points)) <= _LARGEST:
         raise InvalidValue(name, "coordinates", f"must be finite and at most {_LARGEST} m")
     return points
