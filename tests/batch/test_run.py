@@ -131,19 +131,24 @@ def test_ctrl_c_ends_cleanly_with_a_partial_report_and_no_process_left(tmp_path)
     scenes.write(tmp_path / "in", "good")
     scenes.write(tmp_path / "in", "hang", duration=0.5)
     code = (
-        "import replay.batch.run as run, sys; from tests.batch import scenes; from replay.cli.main import main;"
+        "import replay.batch.run as run, signal, sys; from tests.batch import scenes; from replay.cli.main import main;"
+        "signal.signal(signal.SIGINT, signal.default_int_handler);"  # a shell's background jobs ignore it
         "run.run_case = scenes.misbehave; main(sys.argv[1:])"
     )
     out = tmp_path / "out"
     arguments = ["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd", "--workers", "1"]
-    process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE, text=True)
-    while not (out / "good" / "result.json").exists():
-        time.sleep(0.05)
-        assert process.poll() is None
-    time.sleep(0.3)
-    family = psutil.Process(process.pid).children(recursive=True)
-    process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=20)
+    command = [sys.executable, "-c", code, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            while not (out / "good" / "result.json").exists():
+                time.sleep(0.05)
+                assert process.poll() is None
+            time.sleep(0.3)
+            family = psutil.Process(process.pid).children(recursive=True)
+            process.send_signal(signal.SIGINT)
+            _, error = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == 130, error
     assert "Traceback" not in error
     assert family

@@ -211,7 +211,12 @@ def test_a_fault_of_the_program_never_looks_like_a_difference(scenario, monkeypa
 def test_an_interrupted_run_leaves_no_half_recordings(tmp_path, number):
     path = tmp_path / "long.yaml"
     path.write_text(SCENARIO.replace("EXPECTED", "never").replace("duration: 1 s", "duration: 2000 s"))
-    with subprocess.Popen([sys.executable, "-m", "replay", "run", str(path), "-o", str(tmp_path / "out")]) as process:
+    code = (
+        "import signal, sys; from replay.cli.main import main;"
+        "signal.signal(signal.SIGINT, signal.default_int_handler); main(sys.argv[1:])"  # background jobs ignore it
+    )
+    command = [sys.executable, "-c", code, "run", str(path), "-o", str(tmp_path / "out")]
+    with subprocess.Popen(command) as process:
         deadline = time.monotonic() + 60.0
         while not list(tmp_path.glob("out/swing/*.mcap.part")) and time.monotonic() < deadline:
             time.sleep(0.05)
