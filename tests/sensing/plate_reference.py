@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 import mpmath as mp
 
@@ -30,6 +31,26 @@ def plate_integral(triangle: Sequence[Sequence[float]], half_size: Sequence[floa
                     if _owned(piece, u, x_sides) and _owned(piece, v, y_sides):
                         total += _piece_integral([[u(p), v(p), abs(p[2])] for p in piece], piece)
         return total
+
+
+def contact(triangle: Sequence[Sequence[float]], half_size: Sequence[float]) -> tuple[bool, bool]:
+    """Return whether a triangle meets the plate, and whether in more than one point, in rational arithmetic.
+
+    The triangle, which has area, is cut by z = 0 (from below, then from above), then by the borders.
+    """
+    polygon = [[Fraction(x) for x in corner] for corner in triangle]
+    hx, hy = Fraction(half_size[0]), Fraction(half_size[1])
+    for inside in (
+        lambda p: p[2],
+        lambda p: -p[2],
+        lambda p: hx - p[0],
+        lambda p: hx + p[0],
+        lambda p: hy - p[1],
+        lambda p: hy + p[1],
+    ):
+        polygon = _clip(polygon, inside)
+    points = {tuple(p) for p in polygon}
+    return len(points) > 0, len(points) > 1
 
 
 def _slabs(axis, half):

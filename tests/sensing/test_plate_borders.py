@@ -10,6 +10,7 @@ from replay.numerics import transforms
 from replay.numerics.double_double import triangle_area
 from replay.sensing.capacitive import exact, plate_integral
 from replay.sensing.capacitive.clusters import make_clusters
+from replay.sensing.capacitive.pieces import share
 from replay.sensing.capacitive.tree_sum import sum_tree
 from tests.sensing import plate_reference
 
@@ -92,10 +93,10 @@ def _covered(triangle, sign, half, scratch) -> float:
     count = exact._cut_by_plate_plane(triangle, sign, *half, polygon)
     total = 0.0
     for u in (exact.EAST, exact.WEST, exact.NONE):
-        in_slab = exact._region(polygon, count, u, exact.EAST, slab, spare)
+        in_slab = exact._region(polygon, count, u, exact.EAST, 2.0 * half[0], slab, spare)
         for v in (exact.NORTH, exact.SOUTH, exact.NONE) if in_slab >= 3 else ():
-            corners = exact._region(slab, in_slab, v, exact.NORTH, piece, spare)
-            total += sum(exact._share(piece, 0, k, k + 1) for k in range(1, corners - 1))
+            corners = exact._region(slab, in_slab, v, exact.NORTH, 2.0 * half[1], piece, spare)
+            total += sum(share(piece, 0, k, k + 1, triangle) for k in range(1, corners - 1))
     return total
 
 

@@ -159,6 +159,66 @@ def test_finite_integrals_of_touching_triangles_have_their_closed_form():
     assert plate_integral([triangle], [2.0, 2.0])[0] == pytest.approx(1.0, rel=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("triangle", "half", "front", "both"),
+    [
+        (
+            [[0.25, 0.5, 0.1], [0.125, 0.125, -0.2], [0.75, -0.75, 0.2]],
+            [0.25, 0.25],
+            1.2886099166071073,
+            2.7241843872173113,
+        ),
+        (
+            [
+                [-0.031090443827747203, 0.2600105211271745, 0.05],
+                [0.062180887655494406, 0.0, 0.0],
+                [0.062180887655494406, 0.2600105211271745, -0.1],
+            ],
+            [0.031090443827747203, 0.13000526056358724],
+            0.32767544733799958,
+            0.71454183033816538,
+        ),
+    ],
+)
+def test_crossing_the_plate_at_its_corner_alone_is_finite(triangle, half, front, both):
+    for order in ([0, 1, 2], [1, 2, 0], [2, 1, 0]):
+        turned = [np.array(triangle)[order]]
+        assert plate_integral(turned, half)[0] == pytest.approx(front, rel=1e-14)
+        assert plate_integral(turned, half, side="both")[0] == pytest.approx(both, rel=1e-14)
+
+
+def test_triangles_through_the_plate_s_corner_or_just_beside_it():
+    rng = np.random.default_rng(8)
+    one_point = 0
+    for k in range(60):
+        half = rng.choice([0.25, 0.5, 0.75, 3.0], 2)
+        signs = rng.choice([-1, 1], 2)
+        corner, slope = half * signs, signs * rng.integers(1, 4, 2)
+        offsets = rng.integers(-64, 65, (3, 2)) / 64.0
+        triangle = np.column_stack([corner + offsets, offsets @ slope])
+        if k % 2:
+            place = tuple(rng.integers(0, 3, 2))
+            triangle[place] = np.nextafter(triangle[place], rng.choice([-9.0, 9.0]))
+        touches, infinite = plate_reference.contact(triangle.tolist(), half.tolist())
+        one_point += touches and not infinite
+        value = plate_integral([triangle], half, side="both")[0]
+        assert math.isinf(value) == infinite
+        if not infinite:
+            expected = plate_reference.plate_integral(triangle.tolist(), half.tolist(), "both")
+            assert _error(value, expected) <= _TOLERANCE, (triangle.tolist(), half.tolist())
+    assert one_point > 8
+
+
+def test_a_triangle_ten_thousand_million_times_the_plate_s_width():
+    triangle = [
+        [3866.28363973647, -813.208289399121, 3.612673137612748e-08],
+        [-2797.2694129260103, 1513.738078166924, 3.612673137612748e-08],
+        [-4423.742545741093, -2125.132694310842, 3.612673137612748e-08],
+    ]
+    value = plate_integral([triangle], [9.42971301038413e-07, 0.00955917212993031])[0]
+    assert value == pytest.approx(11179.709433044732101, rel=1e-14)
+
+
 def test_midpoint_converges_to_exact_with_second_order():
     rng = np.random.default_rng(2)
     triangles, halves = zip(*[plate_cases.case("random", rng)[:2] for _ in range(20)], strict=True)

@@ -4,9 +4,15 @@ Let T' be the triangle (side both) or the closure of its part with z > 0 (side f
 is infinite if and only if T' has positive area and meets the closed rectangle in more than one point (METHODS 4).
 
 What a triangle has in common with the plane z = 0 is nothing, a point, a segment or, coplanar, all of it. An end of the
-segment is kept as its four signed distances beyond the plate's borders (positive = outside), each to 32 digits and, for
-a point where an edge crosses the plane, multiplied by a positive number: zP uN - zN uP instead of its quotient by
-zP - zN. All decisions below are about signs, so that factor does not matter.
+segment is kept as the four signs of its distances u beyond the plate's borders (1 = outside). Where an edge from P
+(zP > 0) to N (zN < 0) crosses the plane, u has the sign of zP uN - zN uP. Two borders across x and y, at distances u
+and v, are passed in the order that a determinant tells: with p where the triangle's boundary, walked from corner a to
+b to c, comes down to z = 0 (from above, or from 0 on the way below), and q where it comes up,
+
+    sign(u_p v_q - v_p u_q) = sign det[(u_a, v_a, z_a), (u_b, v_b, z_b), (u_c, v_c, z_c)],
+
+whose zero says that the triangle's plane holds the plate's corner u = v = z = 0. Coordinates are exact as given and
+all signs are exact, so a contact at a single point is told from one along a segment.
 """
 
 from __future__ import annotations
@@ -14,7 +20,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.double_double import Pair, difference_of_products, two_sum
+from replay.numerics.double_double import Pair, two_sum
+from replay.numerics.exact_sign import sign_of_determinant, sign_of_difference
 from replay.numerics.jit import kernel
 
 CLEAR = 0
@@ -23,6 +30,7 @@ SATURATED = 2  # and touching
 
 Floats = NDArray[np.float64]
 Borders = tuple[Pair, Pair, Pair, Pair]
+Signs = tuple[int, int, int, int]
 
 
 @kernel
@@ -32,74 +40,100 @@ def borders(x: float, y: float, half_x: float, half_y: float) -> Borders:
 
 
 @kernel
-def crossing(z_p: float, p: Borders, z_n: float, n: Borders) -> Borders:
-    """Return `borders`, times zP - zN, of the point where the edge from P (zP > 0) to N (zN < 0) crosses z = 0."""
-    zp, zn = (z_p, 0.0), (z_n, 0.0)
+def _sign(x: float) -> int:
+    return 1 if x > 0.0 else (-1 if x < 0.0 else 0)
+
+
+@kernel
+def _corner_signs(p: Borders) -> Signs:
+    return _sign(p[0][0]), _sign(p[1][0]), _sign(p[2][0]), _sign(p[3][0])
+
+
+@kernel
+def _crossing_signs(z_p: float, p: Borders, z_n: float, n: Borders) -> Signs:
+    """Return the signs at the point where the edge from P (zP > 0) to N (zN < 0) crosses z = 0."""
     return (
-        difference_of_products(zp, n[0], zn, p[0]),
-        difference_of_products(zp, n[1], zn, p[1]),
-        difference_of_products(zp, n[2], zn, p[2]),
-        difference_of_products(zp, n[3], zn, p[3]),
+        sign_of_difference(z_p, n[0], z_n, p[0]),
+        sign_of_difference(z_p, n[1], z_n, p[1]),
+        sign_of_difference(z_p, n[2], z_n, p[2]),
+        sign_of_difference(z_p, n[3], z_n, p[3]),
     )
 
 
 @kernel
-def _point_meets(p: Borders) -> bool:
-    return p[0][0] <= 0.0 and p[1][0] <= 0.0 and p[2][0] <= 0.0 and p[3][0] <= 0.0
+def _point_meets(p: Signs) -> bool:
+    return p[0] <= 0 and p[1] <= 0 and p[2] <= 0 and p[3] <= 0
 
 
 @kernel
-def _segment_meets(p: Borders, q: Borders) -> int:
-    """Return how many points the segment (p != q) shares with the rectangle: 0 none, 1 one, 2 more.
+def _segment_meets(p: Signs, q: Signs, a: Borders, b: Borders, c: Borders, z_a: float, z_b: float, z_c: float) -> int:
+    """Return how many points the segment from p, down, to q, up, shares with the rectangle: 0 none, 1 one, 2 more.
 
     The segment is inside border k for t up to or from p_k/(p_k - q_k); it meets the rectangle where every entry
-    (p_k > 0) comes before every exit (q_k > 0), which is compared by cross multiplication.
+    (p_k > 0) comes before every exit (q_k > 0). Of opposite borders the entry always comes first.
     """
     result = 2
     for entry in range(4):
-        p_in, q_in = p[entry], q[entry]
-        if p_in[0] > 0.0 and q_in[0] > 0.0:
+        if p[entry] > 0 and q[entry] > 0:
             return 0
-        if (p_in[0] > 0.0 and q_in[0] == 0.0) or (p_in[0] == 0.0 and q_in[0] > 0.0):
+        if (p[entry] > 0 and q[entry] == 0) or (p[entry] == 0 and q[entry] > 0):
             result = 1
-        if not p_in[0] > 0.0:
+        if p[entry] <= 0:
             continue
         for leave in range(4):
-            p_out, q_out = p[leave], q[leave]
-            if not q_out[0] > 0.0:
+            if q[leave] <= 0 or leave // 2 == entry // 2:
                 continue
-            order = difference_of_products(p_in, q_out, p_out, q_in)[0]
-            if order > 0.0:
+            order = sign_of_determinant((a[entry], a[leave], z_a), (b[entry], b[leave], z_b), (c[entry], c[leave], z_c))
+            if order > 0:
                 return 0
-            if order == 0.0:
+            if order == 0:
                 result = 1
     return result
 
 
 @kernel
+def _edge_meets(p: Borders, q: Borders) -> int:
+    """Return how many points an edge in z = 0 shares with the rectangle: the third row makes the order that of p, q."""
+    return _segment_meets(_corner_signs(p), _corner_signs(q), p, q, p, 0.0, 0.0, 1.0)
+
+
+@kernel
 def _coplanar_meets(triangle: Floats, a: Borders, b: Borders, c: Borders) -> int:
-    shared = max(_segment_meets(a, b), _segment_meets(b, c), _segment_meets(c, a))
+    shared = max(_edge_meets(a, b), _edge_meets(b, c), _edge_meets(c, a))
     if shared == 2:
         return 2
     # no edge runs inside the rectangle: the triangle holds all of it, and so its centre, or at most a point
     turns = 0
     for k in range(3):
         p, q = triangle[k], triangle[(k + 1) % 3]
-        turn = difference_of_products((p[0], 0.0), (q[1], 0.0), (p[1], 0.0), (q[0], 0.0))[0]
-        turns += 1 if turn > 0.0 else (-1 if turn < 0.0 else 0)
+        turns += sign_of_difference(p[0], (q[1], 0.0), p[1], (q[0], 0.0))
     return 2 if abs(turns) == 3 else shared
 
 
 @kernel
-def contact(triangle: Floats, area: float, half_x: float, half_y: float, both: bool) -> int:
-    """Return CLEAR, TOUCHING or SATURATED for a triangle (3, 3) [m] of known area in the plate's frame."""
+def _has_area(triangle: Floats) -> bool:
+    for k in range(3):
+        i, j = k, (k + 1) % 3
+        sign = sign_of_determinant(
+            ((triangle[0, i], 0.0), (triangle[0, j], 0.0), 1.0),
+            ((triangle[1, i], 0.0), (triangle[1, j], 0.0), 1.0),
+            ((triangle[2, i], 0.0), (triangle[2, j], 0.0), 1.0),
+        )
+        if sign != 0:
+            return True
+    return False
+
+
+@kernel
+def contact(triangle: Floats, half_x: float, half_y: float, both: bool) -> int:
+    """Return CLEAR, TOUCHING or SATURATED for a triangle (3, 3) [m] in the plate's frame."""
     z0, z1, z2 = triangle[0, 2], triangle[1, 2], triangle[2, 2]
     if (z0 > 0.0 and z1 > 0.0 and z2 > 0.0) or (z0 < 0.0 and z1 < 0.0 and z2 < 0.0):
         return CLEAR
     for axis in range(2):
         half = half_x if axis == 0 else half_y
-        a, b, c = triangle[0, axis], triangle[1, axis], triangle[2, axis]
-        if (a > half and b > half and c > half) or (a < -half and b < -half and c < -half):
+        x0, x1, x2 = triangle[0, axis], triangle[1, axis], triangle[2, axis]
+        if (x0 > half and x1 > half and x2 > half) or (x0 < -half and x1 < -half and x2 < -half):
             return CLEAR
     a = borders(triangle[0, 0], triangle[0, 1], half_x, half_y)
     b = borders(triangle[1, 0], triangle[1, 1], half_x, half_y)
@@ -111,34 +145,29 @@ def contact(triangle: Floats, area: float, half_x: float, half_y: float, both: b
     if shared == 0:
         return CLEAR
     has_front = both or z0 > 0.0 or z1 > 0.0 or z2 > 0.0
-    return SATURATED if shared == 2 and area > 0.0 and has_front else TOUCHING
+    return SATURATED if shared == 2 and has_front and _has_area(triangle) else TOUCHING
 
 
 @kernel
-def _plane_cut_meets(z0: float, z1: float, z2: float, a: Borders, b: Borders, c: Borders) -> int:
+def _plane_cut_meets(z_a: float, z_b: float, z_c: float, a: Borders, b: Borders, c: Borders) -> int:
     """Return how many points the rectangle shares with the segment or point in which a triangle meets z = 0."""
-    count = 0
-    first = a
-    last = a
+    down, up = _corner_signs(a), _corner_signs(a)
     for k in range(3):
-        z_k = z0 if k == 0 else (z1 if k == 1 else z2)
-        z_l = z1 if k == 0 else (z2 if k == 1 else z0)
+        z_k = z_a if k == 0 else (z_b if k == 1 else z_c)
+        z_next = z_b if k == 0 else (z_c if k == 1 else z_a)
+        z_last = z_c if k == 0 else (z_a if k == 1 else z_b)
         p = a if k == 0 else (b if k == 1 else c)
         q = b if k == 0 else (c if k == 1 else a)
         if z_k == 0.0:
-            point = p
-        elif z_k > 0.0 > z_l:
-            point = crossing(z_k, p, z_l, q)
-        elif z_k < 0.0 < z_l:
-            point = crossing(z_l, q, z_k, p)
-        else:
-            continue
-        if count == 0:
-            first = point
-        last = point
-        count += 1
-    if count == 0:
-        return 0
-    if count == 1:
-        return 1 if _point_meets(first) else 0
-    return _segment_meets(first, last)
+            point = _corner_signs(p)
+            if (z_last > 0.0 and z_next > 0.0) or (z_last < 0.0 and z_next < 0.0):
+                return 1 if _point_meets(point) else 0
+            if z_last > 0.0 or z_next < 0.0:
+                down = point
+            else:
+                up = point
+        elif z_k > 0.0 > z_next:
+            down = _crossing_signs(z_k, p, z_next, q)
+        elif z_k < 0.0 < z_next:
+            up = _crossing_signs(z_next, q, z_k, p)
+    return _segment_meets(down, up, a, b, c, z_a, z_b, z_c)

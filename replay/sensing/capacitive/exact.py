@@ -8,11 +8,12 @@ z = 0 and by the four border planes into at most 9 convex pieces a side, each is
 
 u, v and z being linear on a piece. All terms are positive. What makes it exact to rounding:
 
-- A corner of a piece keeps its barycentric coordinates in the triangle, from which shares of the area are taken: no
-  area is lost, however small the triangle is against its coordinates, or the piece against the triangle.
+- A corner of a piece keeps its barycentric coordinates in the triangle: no area is lost, however small the triangle is
+  against its coordinates, or the piece against the triangle (see `pieces`).
 - It also keeps its z and its four distances beyond the borders. Each is a convex combination of the triangle's corners,
-  which are exact differences; a distance that has just been cut is exactly 0. So every coordinate of a piece is
-  accurate to its own size, and a piece lies in one octant, which is what the closed forms ask for.
+  which are exact differences; on a border just cut its distance is exactly 0 and the opposite one's the plate's width.
+  So every coordinate of a piece is accurate to its own size, and a piece lies in one octant, which is what the closed
+  forms ask for.
 - Where an edge crosses z = 0 or a border in x, the distances beyond the other borders may cancel; they are formed there
   with twice the digits. (Cuts in y come last and combine only distances of one sign.)
 - An edge is cut at the same point, to the last digit, whichever of its two pieces asks.
@@ -31,15 +32,22 @@ from replay.numerics.double_double import difference_of_products
 from replay.numerics.inverse_distance import mean_over_triangle
 from replay.numerics.jit import kernel
 from replay.numerics.log_difference import mean_inverse_linear
-from replay.sensing.capacitive.contact import SATURATED, borders, contact, crossing
+from replay.sensing.capacitive.contact import SATURATED, Borders, borders, contact
+from replay.sensing.capacitive.pieces import (
+    COLUMNS,
+    EAST,
+    HEIGHT,
+    LOW,
+    NORTH,
+    SHARE_A,
+    SHARE_B,
+    SHARE_C,
+    SOUTH,
+    WEST,
+    share,
+)
 
 Floats = NDArray[np.float64]
-
-SHARE_A, SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(8)
-LOW = 4
-COLUMNS = 12
-"""Columns of a polygon's corner: barycentric coordinates, |z|, distances beyond the borders. What
-rounding took from a distance is LOW columns behind it."""
 
 NONE = -1
 _SEVERAL = 2
@@ -65,7 +73,7 @@ def integral_over_triangle(
         if _SEVERAL not in (east, north):
             return area * _uncut(triangle, east, north, half_x, half_y)
         return area * _half(triangle, 1.0 if above else -1.0, half_x, half_y, scratch)
-    if contact(triangle, area, half_x, half_y, both) == SATURATED:
+    if contact(triangle, half_x, half_y, both) == SATURATED:
         return math.inf
     mean = 0.0
     if above or not below:
@@ -107,20 +115,20 @@ def _half(triangle: Floats, sign: float, half_x: float, half_y: float, scratch: 
     total = 0.0
     for column in range(3):
         u = (EAST, WEST, NONE)[column]
-        in_slab = _region(polygon, count, u, EAST, slab, spare)
+        in_slab = _region(polygon, count, u, EAST, 2.0 * half_x, slab, spare)
         if in_slab < 3:
             continue
         for row in range(3):
             v = (NORTH, SOUTH, NONE)[row]
-            total += _fan(piece, _region(slab, in_slab, v, NORTH, piece, spare), u, v)
+            total += _fan(piece, _region(slab, in_slab, v, NORTH, 2.0 * half_y, piece, spare), u, v, triangle)
     return total
 
 
 @kernel
-def _region(polygon: Floats, count: int, outside: int, border: int, result: Floats, spare: Floats) -> int:
+def _region(polygon: Floats, count: int, outside: int, border: int, width: float, result: Floats, spare: Floats) -> int:
     """Write a polygon's part beyond border `outside`, or between `border` and the opposite one if that is NONE.
 
-    A polygon in the border's plane is not beyond it.
+    A polygon in the border's plane is not beyond it. `width` is the distance of the two borders.
     """
     if outside != NONE:
         farthest = polygon[0, outside]
@@ -135,17 +143,17 @@ def _region(polygon: Floats, count: int, outside: int, border: int, result: Floa
         # first into `spare` when a second cut follows
         source = polygon if step == 0 else spare
         target = spare if outside == NONE and step == 0 else result
-        kept = _clip(source, count if step == 0 else kept, first + step, sign, target)
+        kept = _clip(source, count if step == 0 else kept, first + step, sign, width, target)
     return kept
 
 
 @kernel
-def _fan(piece: Floats, count: int, u: int, v: int) -> float:
+def _fan(piece: Floats, count: int, u: int, v: int, triangle: Floats) -> float:
     """Return the sum of share x mean of 1/|(u, v, z)| over the triangles that fan out from a piece's first corner."""
     total = 0.0
     for k in range(1, count - 1):
-        share = _share(piece, 0, k, k + 1)
-        if share <= 0.0:
+        part = share(piece, 0, k, k + 1, triangle)
+        if part <= 0.0:
             continue
         if u == NONE and v == NONE:
             mean = mean_inverse_linear(piece[0, HEIGHT], piece[k, HEIGHT], piece[k + 1, HEIGHT])
@@ -154,26 +162,9 @@ def _fan(piece: Floats, count: int, u: int, v: int) -> float:
                 _distance(piece, 0, u, v), _distance(piece, k, u, v), _distance(piece, k + 1, u, v)
             )
         # the triangle as a whole is finite: an infinite mean belongs to a piece which only rounding made
-        if mean < math.inf or share > _ROUNDING_SHARE:
-            total += share * mean
+        if mean < math.inf or part > _ROUNDING_SHARE:
+            total += part * mean
     return total
-
-
-@kernel
-def _share(piece: Floats, a: int, b: int, c: int) -> float:
-    """Return the area of a piece's triangle over the whole one's, from the two coordinates that are smallest there."""
-    in_a = piece[a, SHARE_A] + piece[b, SHARE_A] + piece[c, SHARE_A]
-    in_b = piece[a, SHARE_B] + piece[b, SHARE_B] + piece[c, SHARE_B]
-    in_c = piece[a, SHARE_C] + piece[b, SHARE_C] + piece[c, SHARE_C]
-    first, second = SHARE_B, SHARE_C
-    if in_b >= in_a and in_b >= in_c:
-        first = SHARE_A
-    elif in_c >= in_a:
-        second = SHARE_A
-    share = (piece[b, first] - piece[a, first]) * (piece[c, second] - piece[a, second]) - (
-        piece[b, second] - piece[a, second]
-    ) * (piece[c, first] - piece[a, first])
-    return abs(share)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -182,8 +173,9 @@ def _distance(piece: Floats, corner: int, u: int, v: int) -> tuple[float, float,
 
 
 @kernel
-def _clip(polygon: Floats, count: int, column: int, sign: float, result: Floats) -> int:
+def _clip(polygon: Floats, count: int, column: int, sign: float, width: float, result: Floats) -> int:
     """Write the part of a convex polygon where sign x column >= 0 to `result`; return its number of corners."""
+    opposite = column + 1 if column in (EAST, NORTH) else column - 1
     kept = 0
     for k in range(count):
         following = k + 1 if k + 1 < count else 0
@@ -210,8 +202,21 @@ def _clip(polygon: Floats, count: int, column: int, sign: float, result: Floats)
             for c in range(LOW + EAST, COLUMNS):
                 result[kept, c] = 0.0
             result[kept, column] = 0.0
+            result[kept, opposite] = -width
             kept += 1
     return kept
+
+
+@kernel
+def _crossing(z_p: float, p: Borders, z_n: float, n: Borders) -> Borders:
+    """Return the distances, times zP - zN, of the point where the edge from P (zP > 0) to N (zN < 0) crosses z = 0."""
+    zp, zn = (z_p, 0.0), (z_n, 0.0)
+    return (
+        difference_of_products(zp, n[0], zn, p[0]),
+        difference_of_products(zp, n[1], zn, p[1]),
+        difference_of_products(zp, n[2], zn, p[2]),
+        difference_of_products(zp, n[3], zn, p[3]),
+    )
 
 
 @kernel
@@ -243,7 +248,7 @@ def _cut_by_plate_plane(triangle: Floats, sign: float, half_x: float, half_y: fl
             corner[SHARE_B] = w_high if high == 1 else (w_low if low == 1 else 0.0)
             corner[SHARE_C] = w_high if high == 2 else (w_low if low == 2 else 0.0)
             corner[HEIGHT] = 0.0
-            east, west, north, south = crossing(
+            east, west, north, south = _crossing(
                 above[2],
                 borders(above[0], above[1], half_x, half_y),
                 below[2],

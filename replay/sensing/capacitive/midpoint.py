@@ -31,7 +31,7 @@ def midpoint_over_triangle(
     """
     if area <= 0.0:
         return 0.0
-    if contact(triangle, area, half_x, half_y, both) == SATURATED:
+    if contact(triangle, half_x, half_y, both) == SATURATED:
         return math.inf
     parts = 1 << splits
     a = triangle[0]

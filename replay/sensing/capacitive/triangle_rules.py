@@ -65,7 +65,7 @@ def triangle_within(
     z0, z1, z2 = corners[0, 2], corners[1, 2], corners[2, 2]
     touches = False
     if min(z0, z1, z2) <= 0.0 <= max(z0, z1, z2):
-        touches = contact(corners, area, half_x, half_y, both) != CLEAR
+        touches = contact(corners, half_x, half_y, both) != CLEAR
     if (not both and max(z0, z1, z2) <= 0.0) or (facing and not faces_centre(corners)):
         return 0.0, 0.0, 0.0, touches
     total, share, error = 0.0, 0.0, 0.0

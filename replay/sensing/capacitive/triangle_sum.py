@@ -81,7 +81,7 @@ def sum_triangles(
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
                 into_plate(T, triangles, k, corners)
-                if contact(corners, areas[k], half_x, half_y, both) != CLEAR:
+                if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True
                 if facing and not faces_centre(corners):
                     continue
