@@ -1,41 +1,18 @@
 """Numbers as unevaluated sums of two doubles: 106 bits, for the few queries that 53 bits cannot decide.
 
-A number is (high, low) with |low| <= ulp(high)/2. Sums and products of two doubles are exact; the other operations
-have a relative error of a few 2^-104. Products are split by Veltkamp's constant and need no fused multiply-add, so the
-result is the same on every processor.
+A number is (high, low) with |low| <= ulp(high)/2. Sums and products of two doubles are exact (see
+`numerics.double_double`); the operations here have a relative error of a few 2^-104.
 
 Source: T. J. Dekker 1971; D. E. Knuth, TAOCP 2, 4.2.2; Y. Hida, X. S. Li, D. H. Bailey 2001.
 """
 
 from __future__ import annotations
 
+from replay.numerics.double_double import two_product, two_sum
 from replay.numerics.jit import kernel
 
 Number = tuple[float, float]
 Vector = tuple[Number, Number, Number]
-
-_SPLITTER = 134217729.0  # 2^27 + 1
-
-
-@kernel
-def two_sum(a: float, b: float) -> Number:
-    """Return a + b exactly."""
-    total = a + b
-    virtual = total - a
-    return total, (a - (total - virtual)) + (b - virtual)
-
-
-@kernel
-def two_product(a: float, b: float) -> Number:
-    """Return a b exactly."""
-    product = a * b
-    scaled = _SPLITTER * a
-    a_high = scaled - (scaled - a)
-    a_low = a - a_high
-    scaled = _SPLITTER * b
-    b_high = scaled - (scaled - b)
-    b_low = b - b_high
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
 @kernel

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from replay.collision import double_double as dd
 from replay.collision import exact_simplex
 from replay.collision.support import Sets
+from replay.numerics.double_double import two_sum
 from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
@@ -111,9 +112,9 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
 @leaf_kernel
 def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: Floats, translation: Floats) -> None:
     x, y, z = mapped(b, j, rotation, translation)
-    points[k, 0, 0], points[k, 0, 1] = dd.two_sum(a.vertices[i, 0], -x)
-    points[k, 1, 0], points[k, 1, 1] = dd.two_sum(a.vertices[i, 1], -y)
-    points[k, 2, 0], points[k, 2, 1] = dd.two_sum(a.vertices[i, 2], -z)
+    points[k, 0, 0], points[k, 0, 1] = two_sum(a.vertices[i, 0], -x)
+    points[k, 1, 0], points[k, 1, 1] = two_sum(a.vertices[i, 1], -y)
+    points[k, 2, 0], points[k, 2, 1] = two_sum(a.vertices[i, 2], -z)
 
 
 @leaf_kernel
