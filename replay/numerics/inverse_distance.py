@@ -52,6 +52,12 @@ Nodes = NDArray[np.float64]
 _FAR = 3.0
 """Distance of the centroid in longest edges from which a triangle is integrated by a Gauss rule."""
 
+_UNDERFLOW = 1e-280
+"""Below it a square has lost digits, or all of them."""
+
+_TINY = 1e-60
+"""Size below which a triangle is scaled up, so that fourth powers stay above _UNDERFLOW."""
+
 
 @kernel
 def _minus(a: Triple, b: Triple) -> Triple:
@@ -75,24 +81,41 @@ def _cross(a: Triple, b: Triple) -> Triple:
 
 @kernel
 def _norm(a: Triple) -> float:
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    if square < _UNDERFLOW:
+        largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
+        if largest > 0.0:
+            x, y, z = a[0] / largest, a[1] / largest, a[2] / largest
+            return largest * math.sqrt(x * x + y * y + z * z)
+    return math.sqrt(square)
 
 
 @kernel
-def _segment_integral(length: float, near: float, squared: float, r_near: float, r_far: float) -> float:
+def _segment_integral(length: float, near: float, height: float, r_near: float, r_far: float) -> float:
     """Return int ds/sqrt(s^2 + R0^2) over s = near .. near + length, near >= -length/2; inf through the origin."""
     total = r_near + r_far
     if total > 2.0 * length:
         return 2.0 * math.atanh(length / total)
     far = near + length
     product = near * far
+    squared = height * height
     if product >= 0.0:
         bracket = squared + r_near * r_far + product
     else:
+        if height > 0.0 and squared < _UNDERFLOW:
+            # the same by logarithms, numerator and denominator over `far`
+            gap = r_near * (r_far / far) - near
+            ratio, steep = near / far, height / far
+            numerator = far * (1.0 + ratio * ratio + steep * steep) + gap
+            return 2.0 * (math.log(total + length) - math.log(height)) - math.log(2.0 * numerator) + math.log(gap)
         bracket = squared * (1.0 + (squared + near * near + far * far) / (r_near * r_far - product))
     if bracket <= 0.0:
         return math.inf
-    return math.log((total + length) * (total + length) / (2.0 * bracket))
+    square = (total + length) * (total + length)
+    if bracket < 1e-100 * square:
+        # the quotient might overflow
+        return math.log(square) - math.log(2.0 * bracket)
+    return math.log(square / (2.0 * bracket))
 
 
 @kernel
@@ -110,7 +133,7 @@ def mean_over_segment(p: Triple, q: Triple) -> float:
         return 2.0 / (r_near + r_far)
     near = _dot(p, edge) / length
     height = _norm(_cross(p, edge)) / length
-    return _segment_integral(length, near, height * height, r_near, r_far) / length
+    return _segment_integral(length, near, height, r_near, r_far) / length
 
 
 @kernel
@@ -152,12 +175,12 @@ def _ray_mean(e: Triple, f: Triple, c: Triple) -> float:
             s_k = _dot(k, ray) / a
             s_e = s_k - a
             height = _norm(_cross(k, ray)) / a
-            integral = _segment_integral(a, -s_k, height * height, r_k, r_e)
+            integral = _segment_integral(a, -s_k, height, r_k, r_e)
         else:
             s_e = _dot(e, ray) / a
             s_k = s_e + a
             height = _norm(_cross(e, ray)) / a
-            integral = _segment_integral(a, s_e, height * height, r_e, r_k)
+            integral = _segment_integral(a, s_e, height, r_e, r_k)
         total += WEIGHTS_12[j] * ((s_e + s_k) / (r_e + r_k) - s_e * integral / a) / a
     return 2.0 * total
 
@@ -196,12 +219,12 @@ def _closed_form(base: int, offset: Triple, length: float, foot: float, back: fl
 @kernel
 def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, across: float, depth: float) -> float:
     """Return what the edge from p to q = p + (along, across) adds to the closed form."""
-    length = math.sqrt(along * along + across * across)
+    length = _norm((along, across, 0.0))
     if length <= 0.0:
         return 0.0
     tx, ty = along / length, across / length
-    r_p = math.sqrt(p[0] * p[0] + p[1] * p[1] + depth * depth)
-    r_q = math.sqrt(q[0] * q[0] + q[1] * q[1] + depth * depth)
+    r_p = _norm((p[0], p[1], depth))
+    r_q = _norm((q[0], q[1], depth))
     if r_p <= r_q:
         outward = p[0] * ty - p[1] * tx
         s_p = p[0] * tx + p[1] * ty
@@ -214,7 +237,8 @@ def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, acr
         return 0.0
     squared = outward * outward + depth * depth
     near = s_p if r_p <= r_q else -s_q
-    result = outward * _segment_integral(length, near, squared, min(r_p, r_q), max(r_p, r_q))
+    height = _norm((outward, depth, 0.0))
+    result = outward * _segment_integral(length, near, height, min(r_p, r_q), max(r_p, r_q))
     if depth > 0.0:
         result -= depth * math.atan2(outward * s_q, squared + depth * r_q)
         result += depth * math.atan2(outward * s_p, squared + depth * r_p)
@@ -222,12 +246,7 @@ def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, acr
 
 
 @kernel
-def mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
-    """Return the mean of 1/|r| [1/m] over the triangle with corners a, b, c [m], which may be degenerate.
-
-    inf when the triangle is degenerate and contains the origin in its interior or along an edge of positive length.
-    Accuracy: 1e-14 relative, slivers included (test_inverse_distance). Source: derived in the module's text.
-    """
+def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
     ab, bc, ca = _norm(_minus(b, a)), _norm(_minus(c, b)), _norm(_minus(a, c))
     if bc >= ab and bc >= ca:
         a, b, c = b, c, a
@@ -284,3 +303,23 @@ def mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
     nearest = a if base == 0 else (b if base == 1 else c)
     offset = (_dot(nearest, t), _dot(nearest, m), _dot(nearest, n))
     return _closed_form(base, offset, length, foot, back, width) / (0.5 * length * width)
+
+
+@kernel
+def mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
+    """Return the mean of 1/|r| [1/m] over the triangle with corners a, b, c [m], which may be degenerate.
+
+    inf when the triangle is degenerate and contains the origin in its interior or along an edge of positive length.
+    Accuracy: 1e-14 relative, slivers included (test_inverse_distance). Source: derived in the module's text.
+    """
+    largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
+    largest = max(largest, abs(b[0]), abs(b[1]), abs(b[2]))
+    largest = max(largest, abs(c[0]), abs(c[1]), abs(c[2]))
+    if 0.0 < largest < _TINY:
+        # twice, so that the power of two is finite for denormal numbers too
+        factor = math.ldexp(1.0, -math.frexp(largest)[1] // 2)
+        a = (a[0] * factor * factor, a[1] * factor * factor, a[2] * factor * factor)
+        b = (b[0] * factor * factor, b[1] * factor * factor, b[2] * factor * factor)
+        c = (c[0] * factor * factor, c[1] * factor * factor, c[2] * factor * factor)
+        return _mean_over_triangle(a, b, c) * factor * factor
+    return _mean_over_triangle(a, b, c)

@@ -25,6 +25,9 @@ _SERIES_SPREAD = 0.1
 
 _SERIES_TERMS = 13
 
+_NEGLIGIBLE = 1e-100
+"""z1/z2 below which 1 + 1/b is 1 and the logarithm of a quotient that may overflow is a difference."""
+
 
 @kernel
 def mean_inverse_linear(z0: float, z1: float, z2: float) -> float:
@@ -63,5 +66,9 @@ def mean_inverse_linear(z0: float, z1: float, z2: float) -> float:
         f01 = 0.0
     elif a > 0.0:
         f01 = -(z0 / z1) * math.log1p(-a) / a if a < 0.5 else -(z0 / z1) * math.log(z0 / z1) / a
-    f12 = (z2 / z1) * math.log1p(b) / b if b > 0.0 else 1.0
-    return 2.0 * (f12 - f01) / ((z2 - z0) / z1) / z1
+    f12 = 1.0
+    if z1 < _NEGLIGIBLE * z2:
+        f12 = math.log(z2) - math.log(z1)
+    elif b > 0.0:
+        f12 = (z2 / z1) * math.log1p(b) / b
+    return 2.0 * (f12 - f01) / (z2 - z0)

@@ -190,7 +190,7 @@ def test_crossing_the_plate_at_its_corner_alone_is_finite(triangle, half, front,
 def test_triangles_through_the_plate_s_corner_or_just_beside_it():
     rng = np.random.default_rng(8)
     one_point = 0
-    for k in range(60):
+    for k in range(120):
         half = rng.choice([0.25, 0.5, 0.75, 3.0], 2)
         signs = rng.choice([-1, 1], 2)
         corner, slope = half * signs, signs * rng.integers(1, 4, 2)
@@ -254,6 +254,20 @@ def test_midpoint_takes_region_and_side_at_the_centroid():
         ({"method": "tree"}, "method"),
         ({"method": "midpoint", "splits": 13}, "splits"),
         ({"method": "midpoint", "splits": 1.5}, "splits"),
+        ({"splits": -3}, "splits"),
+        ({"splits": None}, "splits"),
+        ({"triangles": "abc"}, "triangles"),
+        ({"triangles": None}, "triangles"),
+        ({"triangles": {}}, "triangles"),
+        ({"triangles": [[[1.0, 2.0], [3.0]]]}, "triangles"),
+        ({"triangles": np.eye(3)[None] * 1j}, "triangles"),
+        ({"half_size": "ab"}, "half_size"),
+        ({"half_size": None}, "half_size"),
+        ({"half_size": [[1.0], [1.0, 2.0]]}, "half_size"),
+        ({"half_size": np.ones(2) * 1j}, "half_size"),
+        ({"side": []}, "side"),
+        ({"side": np.array(["front", "both"])}, "side"),
+        ({"method": None}, "method"),
     ],
 )
 def test_bad_arguments_are_named(changes, name):
@@ -265,3 +279,26 @@ def test_bad_arguments_are_named(changes, name):
 
 def test_no_triangles_give_no_integrals():
     assert plate_integral(np.empty((0, 3, 3)), [0.1, 0.1]).shape == (0,)
+    assert plate_integral([], [0.1, 0.1]).shape == (0,)
+
+
+def test_the_smallest_numbers_give_an_integral_all_the_same():
+    triangle = [[-0.1, -0.05, 0.1], [0.05, -0.02, 1e-310], [0.02, 0.2, 0.0]]
+    for z, expected in ((1e-310, 288.32912520191394), (1e-307, 285.5298133067497)):
+        triangle[1][2] = z
+        for side in ("front", "both"):
+            assert plate_integral([triangle], [0.5, 0.5], side=side)[0] == pytest.approx(expected, rel=1e-14)
+    triangle[1][2] = 5e-324
+    assert 288.4 < plate_integral([triangle], [0.5, 0.5])[0] < 310.0
+
+
+def test_scaling_by_any_power_of_two_scales_the_integral():
+    for (triangle, half, side), _ in _cases(60, 9):
+        value = plate_integral([triangle], half, side=side)[0]
+        for exponent in (-900, -530, -60, 60, 200):
+            factor = 2.0**exponent
+            if (np.abs(triangle[triangle != 0.0]) * factor > 1e-290).all():
+                assert plate_integral([triangle * factor], half * factor, side=side)[0] == factor * value
+                midpoint = plate_integral([triangle], half, side=side, method="midpoint")[0]
+                scaled = plate_integral([triangle * factor], half * factor, side=side, method="midpoint")[0]
+                assert scaled == factor * midpoint

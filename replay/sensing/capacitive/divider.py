@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arguments import as_float, as_floats
 
 
 def output_voltage(capacitance: ArrayLike, *, coupling: float, supply: float = 2.5) -> NDArray[np.float64]:
@@ -24,7 +25,12 @@ def output_voltage(capacitance: ArrayLike, *, coupling: float, supply: float = 2
 
     Source: Huijgens 2015.
     """
-    sensed = np.asarray(capacitance, dtype=np.float64)
+    try:
+        shape = np.shape(capacitance)
+    except (TypeError, ValueError):
+        shape = ()
+    sensed = as_floats("capacitance", capacitance, shape).reshape(shape)
+    coupling, supply = as_float("coupling", coupling), as_float("supply", supply)
     if np.isnan(sensed).any() or (sensed < 0.0).any():
         raise InvalidValue("capacitance", capacitance, "must be >= 0 F (inf when saturated)")
     if not (np.isfinite(coupling) and coupling > 0.0):

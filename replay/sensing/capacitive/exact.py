@@ -85,14 +85,14 @@ def integral_over_triangle(
 
 @kernel
 def _slab(triangle: Floats, axis: int, half: float) -> int:
-    """Return 1 or -1 when the triangle lies beyond the border at half or -half, 0 between them, else _SEVERAL."""
+    """Return 0 when the triangle lies between the borders, 1 or -1 beyond the one at half or -half, else _SEVERAL."""
     a, b, c = triangle[0, axis], triangle[1, axis], triangle[2, axis]
     low, high = min(a, b, c), max(a, b, c)
+    if -half <= low and high <= half:
+        return 0
     if low >= half:
         return 1
-    if high <= -half:
-        return -1
-    return 0 if -half <= low and high <= half else _SEVERAL
+    return -1 if high <= -half else _SEVERAL
 
 
 @kernel

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arguments import as_floats
 from replay.numerics.double_double import triangle_area
 from replay.numerics.jit import kernel
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
@@ -14,10 +17,16 @@ from replay.sensing.capacitive.midpoint import midpoint_over_triangle
 Floats = NDArray[np.float64]
 
 SIDES = ("front", "both")
+METHODS = ("exact", "midpoint")
 LARGEST_COORDINATE = 1e70
 """[m] Squares of products of coordinates stay finite below it."""
 
 MAX_SPLITS = 12
+
+_SIZE_EXPONENT = 200
+"""Sizes are scaled to 2^200: their fourth powers do not overflow, and 2^-1074 of them has a square above 2^-1750."""
+
+_LARGEST_EXPONENT = 1000
 
 
 def plate_integral(
@@ -32,7 +41,7 @@ def plate_integral(
         half_size: (2,) [m], hx and hy, both > 0.
         side: "front" counts the part with z > 0 only, "both" counts all.
         method: "exact", or "midpoint" for the thesis's 4^splits equal sub-triangles.
-        splits: of "midpoint", 0..12.
+        splits: of "midpoint", 0..12; checked for every method.
 
     Returns:
         (n,) [m]; inf where the counted part has positive area and meets the plate in more than one point.
@@ -40,28 +49,30 @@ def plate_integral(
     Raises:
         InvalidValue: a shape, a number or an option is not as stated.
 
-    Accuracy: "exact" 1e-14 relative to the integral (test_plate_integral). "midpoint" has an error of order 4^-splits
-    away from the plate's plane; a triangle that crosses it on side "front" converges at order 2^-splits.
+    Accuracy: "exact" 2e-14 relative to the integral, for triangles up to 1e10 times the plate too
+        (test_plate_integral); up to 3e-11 for a sliver that passes the plate's edge within 1e-12 of its length. Whether
+        it is infinite is decided without rounding. Triangle and plate are scaled by a power of two first, so that their
+        size does not matter; distances below 1e-250 of it are not resolved in the value. "midpoint" has an error of
+        order 4^-splits away from the plate's plane; a triangle that crosses it on side "front" converges at order
+        2^-splits.
 
     Source: Huijgens 2015 for the model and "midpoint"; closed forms of all regions derived in `exact` and `numerics`.
     """
     corners = check_triangles(triangles)
     half_x, half_y = check_half_size(half_size)
-    if side not in SIDES:
+    if not isinstance(side, str) or side not in SIDES:
         raise InvalidValue("side", side, f"must be one of {', '.join(SIDES)}")
+    if not isinstance(method, str) or method not in METHODS:
+        raise InvalidValue("method", method, f"must be one of {', '.join(METHODS)}")
+    check_splits(splits)
     if method == "exact":
         return _exact(corners, half_x, half_y, side == "both")
-    if method == "midpoint":
-        check_splits(splits)
-        return _midpoint(corners, half_x, half_y, side == "both", splits)
-    raise InvalidValue("method", method, "must be one of exact, midpoint")
+    return _midpoint(corners, half_x, half_y, side == "both", int(splits))
 
 
 def check_triangles(triangles: ArrayLike) -> Floats:
     """Return triangles (n, 3, 3) as contiguous float64; InvalidValue if they are not that, or not finite."""
-    corners = np.ascontiguousarray(triangles, dtype=np.float64)
-    if corners.ndim != 3 or corners.shape[1:] != (3, 3):
-        raise InvalidValue("triangles", f"array of shape {corners.shape}", "must have the shape (n, 3, 3)")
+    corners = as_floats("triangles", triangles, (None, 3, 3))
     if not (np.abs(corners) <= LARGEST_COORDINATE).all():
         raise InvalidValue("triangles", "array", f"coordinates must be finite and at most {LARGEST_COORDINATE:g} m")
     return corners
@@ -69,8 +80,8 @@ def check_triangles(triangles: ArrayLike) -> Floats:
 
 def check_half_size(half_size: ArrayLike) -> tuple[float, float]:
     """Return hx and hy [m]; InvalidValue unless both are finite and > 0."""
-    size = np.asarray(half_size, dtype=np.float64)
-    if size.shape != (2,) or not ((size > 0.0) & (size <= LARGEST_COORDINATE)).all():
+    size = as_floats("half_size", half_size, (2,))
+    if not ((size > 0.0) & (size <= LARGEST_COORDINATE)).all():
         raise InvalidValue("half_size", half_size, "must be two finite lengths > 0 m")
     return float(size[0]), float(size[1])
 
@@ -82,19 +93,40 @@ def check_splits(splits: int) -> None:
 
 
 @kernel
+def _scale(triangle: Floats, half_x: float, half_y: float, result: Floats) -> float:
+    """Write a triangle times a power of two to `result` (3, 3), so that the smallest numbers are far from underflow.
+
+    Returns the power of two: the plate and the integral scale with it.
+    """
+    size = max(half_x, half_y)
+    for k in range(3):
+        for axis in range(3):
+            size = max(size, abs(triangle[k, axis]))
+    exponent = math.frexp(size)[1]
+    factor = math.ldexp(1.0, min(_SIZE_EXPONENT - exponent, _LARGEST_EXPONENT))
+    for k in range(3):
+        for axis in range(3):
+            result[k, axis] = factor * triangle[k, axis]
+    return factor
+
+
+@kernel
 def _exact(triangles: Floats, half_x: float, half_y: float, both: bool) -> Floats:
     result = np.empty(len(triangles))
-    scratch = np.empty(SCRATCH)
+    scratch, scaled = np.empty(SCRATCH), np.empty((3, 3))
     for k in range(len(triangles)):
-        area = triangle_area(triangles[k])
-        result[k] = integral_over_triangle(triangles[k], area, half_x, half_y, both, scratch)
+        factor = _scale(triangles[k], half_x, half_y, scaled)
+        area = triangle_area(scaled) / factor
+        result[k] = integral_over_triangle(scaled, area, factor * half_x, factor * half_y, both, scratch)
     return result
 
 
 @kernel
 def _midpoint(triangles: Floats, half_x: float, half_y: float, both: bool, splits: int) -> Floats:
     result = np.empty(len(triangles))
+    scaled = np.empty((3, 3))
     for k in range(len(triangles)):
-        area = triangle_area(triangles[k])
-        result[k] = midpoint_over_triangle(triangles[k], area, half_x, half_y, both, splits)
+        factor = _scale(triangles[k], half_x, half_y, scaled)
+        area = triangle_area(scaled) / factor
+        result[k] = midpoint_over_triangle(scaled, area, factor * half_x, factor * half_y, both, splits)
     return result

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.numerics import transforms
+from replay.numerics.arguments import as_float, as_floats
 from replay.sensing.capacitive.integral import SIDES, check_half_size
 
 Floats = NDArray[np.float64]
@@ -34,8 +35,9 @@ class Plate:
 
     def __post_init__(self) -> None:
         check_half_size(self.half_size)
-        if np.shape(self.T_link_plate) != (4, 4) or not _is_rigid(np.asarray(self.T_link_plate, dtype=np.float64)):
-            raise InvalidValue(f"plate {self.name!r}: T_link_plate", self.T_link_plate, "must be a rigid (4, 4) pose")
+        place = f"plate {self.name!r}: T_link_plate"
+        if not _is_rigid(as_floats(place, self.T_link_plate, (4, 4))):
+            raise InvalidValue(place, self.T_link_plate, "must be a rigid (4, 4) pose")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +74,15 @@ class CapacitiveSensor:
         if not self.plates:
             raise InvalidValue(f"{place}: plates", (), "must be at least one")
         for name in ("coupling", "permittivity", "supply"):
-            value = getattr(self, name)
+            value = as_float(f"{place}: {name}", getattr(self, name))
             if not (np.isfinite(value) and value > 0.0):
                 raise InvalidValue(f"{place}: {name}", value, "must be finite and > 0")
-        if not (np.isfinite(self.stray_capacitance) and self.stray_capacitance >= 0.0):
-            raise InvalidValue(f"{place}: stray_capacitance", self.stray_capacitance, "must be finite and >= 0")
-        if self.side not in SIDES:
+        stray = as_float(f"{place}: stray_capacitance", self.stray_capacitance)
+        if not (np.isfinite(stray) and stray >= 0.0):
+            raise InvalidValue(f"{place}: stray_capacitance", stray, "must be finite and >= 0")
+        if not isinstance(self.side, str) or self.side not in SIDES:
             raise InvalidValue(f"{place}: side", self.side, f"must be one of {', '.join(SIDES)}")
-        if self.faces not in FACES:
+        if not isinstance(self.faces, str) or self.faces not in FACES:
             raise InvalidValue(f"{place}: faces", self.faces, f"must be one of {', '.join(FACES)}")
 
     def senses(self, link: int) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arguments import as_float
 from replay.sensing.capacitive.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import check_splits
@@ -56,15 +57,16 @@ class CapacitiveSuite:
         rtol: float = 1e-6,
         splits: int = 4,
     ) -> None:
-        if method not in METHODS:
+        if not isinstance(method, str) or method not in METHODS:
             raise InvalidValue("method", method, f"must be one of {', '.join(METHODS)}")
+        rtol = as_float("rtol", rtol)
         if not SMALLEST_RTOL <= rtol <= 1.0:
             raise InvalidValue("rtol", rtol, f"must be from {SMALLEST_RTOL:g} to 1")
         check_splits(splits)
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
         self.method = method
-        self.rtol = float(rtol)
+        self.rtol = rtol
         self._splits = splits if method == "midpoint" else EXACT
         sensed = [any(sensor.senses(target.link) for sensor in self.sensors) for target in self.targets]
         self._clusters: list[Clusters | None] = [
