@@ -60,7 +60,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 
 pictures: setup system  ## render the README's pictures from the recordings that `make run` left
 	mkdir -p scenarios/pictures
-	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.9
+	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.6
 	$(BIN)/replay view $(RECORDINGS)/carm_parking/carm_parking.rrd --screenshot scenarios/pictures/carm_parking.png --at 4.2
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files

@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+import replay
 from replay.collision import gjk
 from replay.errors import InvalidValue, ReplayError
 from replay.geometry import bounds
@@ -57,6 +58,11 @@ def test_what_is_not_one_real_number(value):
         lambda value: closest_in_cone(TRIANGLE, [0, 0, 0], value, 1.0),
         lambda value: closest_in_cone(TRIANGLE, [0, 0, 0], [0, 0, 1], value),
         lambda value: closest_in_cone(TRIANGLE, [0, 0, 0], [0, 0, 1], 1.0, range=value),
+        lambda value: replay.sensing.capacitive.plate_integral(value, [1, 1]),
+        lambda value: replay.sensing.capacitive.plate_integral(TRIANGLE, value),
+        lambda value: replay.sensing.capacitive.output_voltage(value, coupling=1.0),
+        lambda value: replay.sensing.capacitive.output_voltage(1.0, coupling=value),
+        lambda value: replay.sensing.capacitive.output_voltage(1.0, coupling=1.0, supply=value),
     ],
 )
 def test_public_functions_refuse_what_is_no_number(call, value):
