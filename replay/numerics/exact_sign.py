@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.double_double import Pair
+from replay.numerics.double_double import Pair, triangle_area
 from replay.numerics.jit import kernel
 
 Limbs = NDArray[np.int64]
@@ -29,6 +29,9 @@ _LIMBS = (_LOWEST + 3 * 1024) // _BITS + 3
 
 _CERTAIN = 1e-14
 """Bound of the rounding of a determinant over the sum of its terms' sizes; at most 9 roundings of 1.1e-16 meet."""
+
+_SLIVER = 1e-20
+"""Area over squared size from which on a triangle is not degenerate: twice the digits of a double leave 1e-30."""
 
 _SMALLEST = 1e-200
 """Below it the sum of the terms may have lost something by underflow (coordinates up to 1e70)."""
@@ -129,3 +132,31 @@ def sign_of_determinant(a: Row, b: Row, c: Row) -> int:
             _add(total, c[2], a[0][i], b[1][j])
             _add(total, -c[2], a[1][i], b[0][j])
     return _sign(total)
+
+
+@kernel
+def has_area(triangle: NDArray[np.float64]) -> bool:
+    """Return whether the corners of a triangle (3, 3) are not on one line, exactly."""
+    for i in range(3):
+        j = (i + 1) % 3
+        sign = sign_of_determinant(
+            ((triangle[0, i], 0.0), (triangle[0, j], 0.0), 1.0),
+            ((triangle[1, i], 0.0), (triangle[1, j], 0.0), 1.0),
+            ((triangle[2, i], 0.0), (triangle[2, j], 0.0), 1.0),
+        )
+        if sign != 0:
+            return True
+    return False
+
+
+@kernel
+def area_or_zero(triangle: NDArray[np.float64]) -> float:
+    """Return `triangle_area`, and 0 where that is the exact area but rounding left something."""
+    area = triangle_area(triangle)
+    size = 0.0
+    for axis in range(3):
+        low = min(triangle[0, axis], triangle[1, axis], triangle[2, axis])
+        size = max(size, max(triangle[0, axis], triangle[1, axis], triangle[2, axis]) - low)
+    if area > _SLIVER * size * size or has_area(triangle):
+        return area
+    return 0.0

@@ -187,6 +187,12 @@ def test_crossing_the_plate_at_its_corner_alone_is_finite(triangle, half, front,
         assert plate_integral(turned, half, side="both")[0] == pytest.approx(both, rel=1e-14)
 
 
+def test_corners_on_one_line_through_the_plate_have_no_integral():
+    corners = [[0.041666666666666664, 0.0375, 0.0], [-0.08333333333333333, 0.15, 0.0], [0.08333333333333333, 0.0, 0.0]]
+    for method in ("exact", "midpoint"):
+        assert plate_integral([corners], [0.08333333333333333, 0.075], side="both", method=method)[0] == 0.0
+
+
 def test_triangles_through_the_plate_s_corner_or_just_beside_it():
     rng = np.random.default_rng(8)
     one_point = 0

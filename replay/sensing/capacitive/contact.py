@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.double_double import Pair, two_sum
-from replay.numerics.exact_sign import sign_of_determinant, sign_of_difference
+from replay.numerics.exact_sign import has_area, sign_of_determinant, sign_of_difference
 from replay.numerics.jit import kernel
 
 CLEAR = 0
@@ -111,20 +111,6 @@ def _coplanar_meets(triangle: Floats, a: Borders, b: Borders, c: Borders) -> int
 
 
 @kernel
-def _has_area(triangle: Floats) -> bool:
-    for k in range(3):
-        i, j = k, (k + 1) % 3
-        sign = sign_of_determinant(
-            ((triangle[0, i], 0.0), (triangle[0, j], 0.0), 1.0),
-            ((triangle[1, i], 0.0), (triangle[1, j], 0.0), 1.0),
-            ((triangle[2, i], 0.0), (triangle[2, j], 0.0), 1.0),
-        )
-        if sign != 0:
-            return True
-    return False
-
-
-@kernel
 def contact(triangle: Floats, half_x: float, half_y: float, both: bool) -> int:
     """Return CLEAR, TOUCHING or SATURATED for a triangle (3, 3) [m] in the plate's frame."""
     z0, z1, z2 = triangle[0, 2], triangle[1, 2], triangle[2, 2]
@@ -145,7 +131,7 @@ def contact(triangle: Floats, half_x: float, half_y: float, both: bool) -> int:
     if shared == 0:
         return CLEAR
     has_front = both or z0 > 0.0 or z1 > 0.0 or z2 > 0.0
-    return SATURATED if shared == 2 and has_front and _has_area(triangle) else TOUCHING
+    return SATURATED if shared == 2 and has_front and has_area(triangle) else TOUCHING
 
 
 @kernel

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
-from replay.numerics.double_double import triangle_area
+from replay.numerics.exact_sign import area_or_zero
 from replay.numerics.jit import kernel
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
 from replay.sensing.capacitive.midpoint import midpoint_over_triangle
@@ -49,12 +49,13 @@ def plate_integral(
     Raises:
         InvalidValue: a shape, a number or an option is not as stated.
 
-    Accuracy: "exact" 2e-14 relative to the integral, for triangles up to 1e10 times the plate too
-        (test_plate_integral); up to 3e-11 for a sliver that passes the plate's edge within 1e-12 of its length. Whether
-        it is infinite is decided without rounding. Triangle and plate are scaled by a power of two first, so that their
-        size does not matter; distances below 1e-250 of it are not resolved in the value. "midpoint" has an error of
-        order 4^-splits away from the plate's plane; a triangle that crosses it on side "front" converges at order
-        2^-splits.
+    Accuracy: "exact" 2e-14 relative to the integral, for triangles 1e10 times as wide as the plate too
+        (test_plate_integral); 4e-11 for a sliver that passes the plate's edge within 1e-12 of its length, 1e-8 for a
+        triangle whose section with z = 0 passes the plate's corner within 1e-16. Whether it is infinite is decided
+        without rounding; a finite one above 1.8e308 m is inf as well. Triangle and plate are scaled by a power of two
+        first, so that their size does not matter; distances below 1e-250 of it are not resolved. "midpoint" has an
+        error of order 4^-splits away from the plate's plane; a triangle that crosses it on side "front" converges at
+        order 2^-splits.
 
     Source: Huijgens 2015 for the model and "midpoint"; closed forms of all regions derived in `exact` and `numerics`.
     """
@@ -116,7 +117,7 @@ def _exact(triangles: Floats, half_x: float, half_y: float, both: bool) -> Float
     scratch, scaled = np.empty(SCRATCH), np.empty((3, 3))
     for k in range(len(triangles)):
         factor = _scale(triangles[k], half_x, half_y, scaled)
-        area = triangle_area(scaled) / factor
+        area = area_or_zero(scaled) / factor
         result[k] = integral_over_triangle(scaled, area, factor * half_x, factor * half_y, both, scratch)
     return result
 
@@ -127,6 +128,6 @@ def _midpoint(triangles: Floats, half_x: float, half_y: float, both: bool, split
     scaled = np.empty((3, 3))
     for k in range(len(triangles)):
         factor = _scale(triangles[k], half_x, half_y, scaled)
-        area = triangle_area(scaled) / factor
+        area = area_or_zero(scaled) / factor
         result[k] = midpoint_over_triangle(scaled, area, factor * half_x, factor * half_y, both, splits)
     return result

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.double_double import triangle_area, two_sum
+from replay.numerics.double_double import two_sum
+from replay.numerics.exact_sign import area_or_zero
 from replay.numerics.jit import kernel
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
@@ -23,7 +24,7 @@ def triangle_areas(triangles: Floats) -> Floats:
     """Return the areas (n,) [m^2] of triangles (n, 3, 3) [m]."""
     result = np.empty(len(triangles))
     for k in range(len(triangles)):
-        result[k] = triangle_area(triangles[k])
+        result[k] = area_or_zero(triangles[k])
     return result
 
 
