@@ -47,7 +47,10 @@ def as_float(name: str, value: Any) -> float:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise InvalidValue(name, _shown(value), "must be a real number")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise InvalidValue(name, _shown(value), "is too large for a double") from None
 
 
 def _shown(value: object) -> str:

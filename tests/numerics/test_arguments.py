@@ -43,6 +43,11 @@ def test_what_is_not_one_real_number(value):
         as_float("x", value)
 
 
+def test_a_whole_number_beyond_all_doubles():
+    with pytest.raises(InvalidValue, match="too large"):
+        as_float("x", 10**400)
+
+
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 @pytest.mark.parametrize(
     "call",
