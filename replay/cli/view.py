@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import click
@@ -21,6 +22,8 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at belongs to --screenshot")
+    if at is not None and not 0.0 <= at < math.inf:
+        raise click.UsageError(f"--at {at:g} is no moment of a recording; give seconds from its start")
     files = rerun_files(recordings)
     if screenshot is None:
         show(files, web=web)

@@ -122,6 +122,8 @@ def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
             data = path.read_bytes()
         except OSError as error:
             raise MeshError(name, error.strerror or "cannot be read") from error
+    if ending == ".stl":
+        _check_binary_stl(name, data)
     import trimesh
 
     try:
@@ -135,6 +137,19 @@ def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise MeshError(name, f"is not a readable {ending[1:].upper()} file: {reason[:200]}") from error
     return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _check_binary_stl(name: str, data: bytes) -> None:
+    """Refuse a binary STL file that is not as long as its header says; text files begin with "solid"."""
+    if data[:5].lower() == b"solid":
+        return
+    announced = int.from_bytes(data[80:84], "little")
+    needed = 84 + 50 * announced
+    if len(data) < 84:
+        raise MeshError(name, f"is not a whole STL file: its header is cut; the file has {len(data)} bytes")
+    if len(data) < needed:
+        rule = f"its header announces {announced} triangles, which need {needed} bytes; the file has {len(data)}"
+        raise MeshError(name, f"is not a whole STL file: {rule}")
 
 
 def _have_area(triangles: Array) -> NDArray[np.bool_]:

@@ -31,6 +31,7 @@ APPLICATION = "replay"
 LEVEL_COLORS = {Level.BOUNDS: (255, 150, 20, 255), Level.CONTACT: (235, 35, 35, 255)}
 """Colours of a body while one of its pairs is at that level."""
 
+_FLUSH = 20.0  # [s] until what is left must have reached the disk
 _LOG_LEVELS = {2: "INFO", 3: "WARN", 4: "ERROR"}
 
 
@@ -78,7 +79,10 @@ class RerunWriter:
         if self._stream is not None:
             charts = sorted({path[0] for path in self._curves})
             self._stream.send_blueprint(blueprint.blueprint(charts, self._corners, self._end), make_active=False)
-            self._stream.flush()
+            try:  # on a full disk the library's writing thread is gone, and may leave a flush without an answer
+                self._stream.flush(timeout_sec=_FLUSH)
+            except Exception as error:
+                raise WriteError(str(self._file.path), f"not all of it was written: {error}") from None
             self._stream.disconnect()
             self._check_footer()
         self._file.commit()

@@ -31,7 +31,17 @@ Name = Annotated[str, StringConstraints(pattern=_NAME, max_length=100)]
 _TITLE = r"^[^./\\\x00-\x1f\x7f-\x9f][^/\\\x00-\x1f\x7f-\x9f]*$"
 TITLE_RULE = "must have 1 to 100 characters, must not start with '.' and must not hold / \\ or control characters"
 
-Title = Annotated[str, StringConstraints(pattern=_TITLE, max_length=100)]
+MAX_TITLE_BYTES = 200  # file systems take names of 255 bytes, and ".mcap.part" is added to it
+
+
+def _fits_file_systems(title: str) -> str:
+    size = len(title.encode())
+    if size > MAX_TITLE_BYTES:
+        raise rejected(f"takes {size} bytes as the name of a file; at most {MAX_TITLE_BYTES} fit everywhere")
+    return title
+
+
+Title = Annotated[str, StringConstraints(pattern=_TITLE, max_length=100), AfterValidator(_fits_file_systems)]
 """Name of a scenario; it becomes the name of a folder and of files."""
 
 Text = Annotated[str, StringConstraints(max_length=10_000)]

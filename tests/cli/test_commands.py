@@ -157,6 +157,7 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
         (["view", "none.rrd", "--at", "1"], "--at belongs to --screenshot"),
         (["run", "none.yaml"], "is not there"),
+        (["view", "none.rrd", "--screenshot", "x.png", "--at", "nan"], "is no moment of a recording"),
     ],
 )
 def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):

@@ -27,8 +27,6 @@ Sweep = Callable[["DistanceSensor", int, Array, Nearest], None]
 
 METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
-REVISIONS = {"exact": 1, "rays": 1, "thesis": 1}
-"""Bumped when a method's readings change beyond the shipped comparison rules."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.scenario.methods import METHOD_REVISIONS
 from replay.sensing.distance import DistanceSuite
-from replay.sensing.distance.suite import METHODS, REVISIONS
+from replay.sensing.distance.suite import METHODS
 from tests.sensing.distance.test_suite import SENSORS, TARGETS, machine, moving
 
 FROZEN = Path(__file__).parents[2] / "data" / "distance_readings.json"
@@ -15,7 +16,7 @@ FROZEN = Path(__file__).parents[2] / "data" / "distance_readings.json"
 
 @pytest.mark.parametrize("method", METHODS)
 def test_readings_of_this_revision_are_frozen(method):
-    key = f"distance.{method}@{REVISIONS[method]}"
+    key = f"distance.{method}@{METHOD_REVISIONS[f'distance.{method}']}"
     frozen = json.loads(FROZEN.read_text())
     assert key in frozen, f"freeze the readings of {key} in {FROZEN}"
     expected = np.array(frozen[key], dtype=float)  # null becomes NaN
