@@ -58,12 +58,6 @@ def apply(T_a_b: Array, points: Array) -> Array:
     return np.stack(rows, axis=-1)
 
 
-def rotate(T_a_b: Array, vectors: Array) -> Array:
-    """Return vectors (..., 3) given in b, in a: the rotation alone."""
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    return np.stack([T_a_b[..., r, 0] * x + T_a_b[..., r, 1] * y + T_a_b[..., r, 2] * z for r in range(3)], axis=-1)
-
-
 def sine(angle: Array) -> Array:
     """Return the sine [-] of angles [rad], element by element with the C library's function."""
     return np.array([math.sin(value) for value in angle.ravel().tolist()]).reshape(angle.shape)
