@@ -52,14 +52,8 @@ def tables(recording: Recording) -> dict[str, Table]:
         result[f"/distance/{name}"] = {**time, **_distance(recording, sensor)}
     for sensor, name in enumerate(layout.capacitive_sensors if recording.capacitive is not None else ()):
         result[f"/capacitive/{name}"] = {**time, **_capacitive(recording, sensor)}
-    events = recording.events
-    result["/events"] = {
-        "time [ns]": np.array([event.time for event in events], dtype=np.int64),
-        "frame": np.array([event.frame for event in events], dtype=np.int64),
-        "kind": np.array([event.kind for event in events], dtype=np.str_),
-        "begins": np.array([event.begins for event in events], dtype=np.bool_),
-        "subject": np.array([event.subject for event in events], dtype=np.str_),
-    }
+    events = recording.events.columns()
+    result["/events"] = {"time [ns]": events.pop("time"), **events}
     return result
 
 

@@ -230,13 +230,14 @@ class RerunWriter:
         if not events:
             return
         index = [
-            rr.TimeColumn(
-                blueprint.TIMELINE, duration=np.array([e.time for e in events], dtype="int64").astype("timedelta64[ns]")
-            ),
-            rr.TimeColumn("frame", sequence=[event.frame for event in events]),
+            rr.TimeColumn(blueprint.TIMELINE, duration=events.time.astype("timedelta64[ns]")),
+            rr.TimeColumn("frame", sequence=events.frame),
         ]
+        texts = [what.text for what in events.transitions]
+        levels = [_LOG_LEVELS[what.severity] for what in events.transitions]
+        codes = events.code.tolist()
         columns = rr.TextLog.columns(
-            text=[f"{event.time / 1e9:.3f} s  {event.text}" for event in events],
-            level=[_LOG_LEVELS[event.severity] for event in events],
+            text=[f"{time / 1e9:.3f} s  {texts[code]}" for time, code in zip(events.time.tolist(), codes, strict=True)],
+            level=[levels[code] for code in codes],
         )
         self._stream.send_columns(blueprint.EVENTS, indexes=index, columns=columns, strict=True)
