@@ -148,15 +148,13 @@ class EventFinder:
         ]
         self._first: dict[str, int] = {}
         self._last: dict[str, Flags] = {}
-        transitions: list[Transition] = []
+        self._subjects: list[tuple[str, str, str]] = []
         for topic, names, kinds in groups:
             for kind in kinds:
-                self._first[kind] = len(transitions)
+                self._first[kind] = 2 * len(self._subjects)
                 self._last[kind] = np.zeros(len(names), dtype=np.bool_)
                 for name in names:
-                    source = topic if topic == "/collision" else f"{topic}/{name}"
-                    transitions += [Transition(kind, begins, name, source) for begins in (False, True)]
-        self._transitions = tuple(transitions)
+                    self._subjects.append((kind, name, topic if topic == "/collision" else f"{topic}/{name}"))
 
     def find(self, block: FrameBlock) -> Events:
         """Return the events of the next block, by frame, and within a frame by kind and name."""
@@ -167,9 +165,15 @@ class EventFinder:
             frame, index = np.nonzero(changed)
             frames.append(frame)
             codes.append(self._first[kind] + 2 * index + state[frame, index])
-        frame, code = np.concatenate(frames), np.concatenate(codes)
+        frame = np.concatenate(frames)
+        found, code = np.unique(np.concatenate(codes), return_inverse=True)
         order = np.argsort(frame, kind="stable")
-        return Events(block.time[frame[order]], block.first + frame[order], code[order], self._transitions)
+        transitions = tuple(self._transition(number) for number in found.tolist())
+        return Events(block.time[frame[order]], block.first + frame[order], code[order], transitions)
+
+    def _transition(self, number: int) -> Transition:
+        kind, subject, source = self._subjects[number // 2]
+        return Transition(kind, number % 2 == 1, subject, source)
 
 
 def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:

@@ -67,6 +67,11 @@ class McapWriter:
         self._topics: list[tuple[FrameTopic, int]] = []
         self._log: McapFileWriter | None = None
         self._event_channel = 0
+        self._scene_data = b""
+
+    def prepare(self) -> None:
+        """Encode the scene; what else comes before the first block depends on it."""
+        self._scene_data = scene_message(self._scene)
 
     def write(self, block: FrameBlock) -> None:
         """Append a block; the first one decides which groups of columns the recording has."""
@@ -95,6 +100,8 @@ class McapWriter:
         self._file.discard()
 
     def _begin(self, block: FrameBlock) -> McapFileWriter:
+        if not self._scene_data:
+            self.prepare()
         log = McapFileWriter(self._file, f"replay {self._provenance.version}")
         log.metadata(RECORD, self._provenance.to_metadata())
         for name, data in sorted(self._files.items()):
@@ -114,5 +121,5 @@ class McapWriter:
         self._event_channel = log.channel(EVENTS, schemas[messages.LOG])
         self._topics = [(topic, log.channel(topic.name, schemas[topic.type])) for topic in topics]
         log.end_preamble()
-        log.messages(scene, [0], [0], [scene_message(self._scene)])
+        log.messages(scene, [0], [0], [self._scene_data])
         return log
