@@ -45,8 +45,8 @@ def blueprint(charts: Sequence[str], corners: Floats, end: int) -> Any:
     middle = 0.5 * (low + high)
     distance = 0.85 * float(np.linalg.norm(high - low)) + 0.1
     eye = middle + distance * _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION)
-    readings = [chart(name, [""], end) for name in (DISTANCE, CAPACITIVE, CLEARANCE) if name in charts]
-    behind = [chart(name, [""], end) for name in (JOINTS,) if name in charts]
+    readings = [chart(name, end) for name in (DISTANCE, CAPACITIVE, CLEARANCE) if name in charts]
+    behind = [chart(name, end) for name in (JOINTS,) if name in charts]
     scenario = rrb.TextDocumentView(origin=f"/{SCENARIO}", name="Scenario")
     below = rrb.Tabs(event_table(), *behind, scenario, active_tab=0)
     return whole(
@@ -62,14 +62,19 @@ def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Floats, targe
         charts, end: as of `blueprint`, of all together.
         eye, target: (3,) [m], from where to where every scene is looked at.
     """
+    import rerun as rr
     import rerun.blueprint as rrb
 
-    prefixes = [f"/{side}" for side in sides]
-    scenes = [scene_view(eye, target, prefix, side) for side, prefix in zip(sides, prefixes, strict=True)]
-    tables = [event_table(prefix, f"Events of {side}") for side, prefix in zip(sides, prefixes, strict=True)]
-    curves = [chart(name, prefixes, end) for name in _TITLES if name in charts]
-    below = [rrb.Tabs(*curves, active_tab=0)] if curves else []
-    return whole(rrb.Vertical(rrb.Horizontal(*scenes), rrb.Horizontal(*below, *tables), row_shares=[3, 2]))
+    columns = []
+    for side in sides:
+        prefix = f"/{rr.escape_entity_path_part(side)}"
+        curves = [chart(name, end, prefix) for name in _TITLES if name in charts]
+        below = [rrb.Tabs(*curves, active_tab=0)] if curves else []
+        shares = [5, 3, 2] if curves else [5, 2]
+        columns.append(
+            rrb.Vertical(scene_view(eye, target, prefix, side), *below, event_table(prefix), row_shares=shares)
+        )
+    return whole(rrb.Horizontal(*columns))
 
 
 def whole(container: Any) -> Any:
@@ -94,17 +99,17 @@ def scene_view(eye: Floats, target: Floats, prefix: str = "", name: str = "Scene
     )
 
 
-def event_table(prefix: str = "", name: str = "Events") -> Any:
+def event_table(prefix: str = "") -> Any:
     """Return a table of the events below a prefix."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
     columns = rrb.TextLogColumns(text_log_columns=[TextLogColumn(kind) for kind in ("LogLevel", "Body")])
-    return rrb.TextLogView(origin=f"{prefix}/{EVENTS}", name=name, columns=columns)
+    return rrb.TextLogView(origin=f"{prefix}/{EVENTS}", name="Events", columns=columns)
 
 
-def chart(name: str, prefixes: Sequence[str], end: int) -> Any:
-    """Return a chart of the curves below each prefix, from 0 to `end` [ns]."""
+def chart(name: str, end: int, prefix: str = "") -> Any:
+    """Return a chart of the curves below a prefix, from 0 to `end` [ns]."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -112,8 +117,7 @@ def chart(name: str, prefixes: Sequence[str], end: int) -> Any:
         start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.absolute(seconds=max(end, 1) / 1e9)
     )
     return rrb.TimeSeriesView(
-        origin=f"{prefixes[0]}/{name}" if len(prefixes) == 1 else "/",
-        contents=[f"+ {prefix}/{name}/**" for prefix in prefixes],
+        origin=f"{prefix}/{name}",
         name=_TITLES[name],
         axis_x=rrb.TimeAxis(view_range=span),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),

@@ -16,7 +16,6 @@ from replay.recording.rerun_file import RerunFile
 from replay.recording.scene_view import Floats
 
 _CHARTS = (blueprint.DISTANCE, blueprint.CAPACITIVE, blueprint.CLEARANCE, blueprint.JOINTS)
-_CURVE = "SeriesLines:names"
 _EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
 
 
@@ -102,21 +101,17 @@ class _Found:
 
 
 def _copy(stream: Any, chunk: Any, side: str, found: _Found) -> None:
-    """Send a chunk below the name of its side; its curves are called after the side too."""
+    """Send a chunk below the name of its side."""
     import rerun as rr
 
     path = str(chunk.entity_path)
     if path.startswith("/__"):  # properties of the recording itself
         return
     batch = chunk.to_record_batch()
-    target = f"{rr.new_entity_path([side])}{path}"
-    stream.send_chunks(chunk.with_entity_path(target))
+    stream.send_chunks(chunk.with_entity_path(f"{rr.new_entity_path([side])}{path}"))
     top = path.split("/")[1]
     if top in _CHARTS:
         found.charts.add(top)
-    if _CURVE in batch.schema.names:
-        (name,) = batch.column(_CURVE).to_pylist()[-1]
-        stream.log(target, rr.SeriesLines(names=f"{name} ({side})"), static=True)
     if blueprint.TIMELINE in chunk.timeline_names and len(batch):
         times = batch.column(blueprint.TIMELINE).cast("int64").to_numpy(zero_copy_only=False)
         found.end = max(found.end, int(times.max()))
