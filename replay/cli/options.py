@@ -67,14 +67,6 @@ def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:
     click.echo(text() if form == "text" else json.dumps(data(), indent=1))
 
 
-def announce_compiling() -> None:
-    """Say on stderr that kernels will be compiled, when none are."""
-    from replay.numerics.jit import is_cache_empty
-
-    if is_cache_empty():
-        note("compiling kernels; this takes about a minute, once")
-
-
 def note(message: str) -> None:
     """Write a remark to stderr, where it does not disturb results."""
     click.echo(f"replay: {message}", err=True)
