@@ -26,7 +26,7 @@ def show(form: str, run: Run) -> None:
 
 
 def exit_code(run: Run) -> ExitCode:
-    """Return what the shell is told of a run: of nothing but invalid scenarios, the same as when they cannot be read."""
+    """Return what the shell is told of a run; nothing but invalid scenarios is invalid input."""
     if run.results and all(result.invalid for result in run.results):
         return ExitCode.INVALID
     interrupted = ExitCode.INTERRUPTED if run.interrupted else ExitCode.FINE

@@ -44,9 +44,7 @@ def check(data: bytes) -> int:
     else:
         least = sum(element.count * sum(element.sizes) for element in elements)
         if len(body) < least:
-            raise ValueError(
-                f"its header announces {announced}: {least} bytes or more; {len(body)} bytes follow"
-            )
+            raise ValueError(f"its header announces {announced}: {least} bytes or more; {len(body)} bytes follow")
     return next((element.count for element in elements if element.name == "face"), 0)
 
 

@@ -64,7 +64,7 @@ _announcement = Announcement(_on_stderr)
 
 def install() -> None:
     """Let the compiling of kernels be announced in this process, on stderr."""
-    event.register("numba:compile", _announcement)
+    event.register("numba:compile", _announcement)  # type: ignore[no-untyped-call]
 
 
 def announce_by(tell: Callable[[str], None]) -> None:

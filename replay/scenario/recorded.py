@@ -44,11 +44,12 @@ def tracks(scenario: Scenario, file: str, data: bytes) -> tuple[dict[str, Track]
     try:
         log = _read(scenario, file, data)
         joints = dict(written.joints) or _same_names(scenario, log)
+        begin = _begin(written.start, log)
     except Unusable as error:
         return found, [scenario.provenance.problem(error.path, error.rule)]
     for joint, source in joints.items():
         try:
-            found[joint] = _track(scenario, joint, source, log)
+            found[joint] = _track(scenario, joint, source, log, begin)
         except Unusable as error:
             problems.append(scenario.provenance.problem(error.path, error.rule))
     return found, problems
@@ -71,6 +72,15 @@ def _read(scenario: Scenario, file: str, data: bytes) -> dict[str, JointTrack]:
         return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9))
     except RecordingError as error:
         raise Unusable((*PATH, "file"), error.reason) from None
+
+
+def _begin(start: float, log: dict[str, JointTrack]) -> int:
+    """Return the time [ns] of the log's first sample, of whichever joint."""
+    times = [track.time for track in log.values()]
+    begin, end = min(int(time.min()) for time in times), max(int(time.max()) for time in times)
+    if begin + start * 1e9 > end:
+        raise Unusable((*PATH, "start"), f"is after the log's last sample, {(end - begin) / 1e9:.6g} s after its first")
+    return begin
 
 
 def _same_names(scenario: Scenario, log: dict[str, JointTrack]) -> dict[str, RecordedJoint]:
@@ -97,7 +107,7 @@ def _scripted(scenario: Scenario, joint: str) -> str:
     return "motion.moves" if any(joint in move.to for move in scenario.motion.moves) else ""
 
 
-def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str, JointTrack]) -> Track:
+def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str, JointTrack], begin: int) -> Track:
     written = scenario.motion.recorded
     assert written is not None
     path = (*PATH, "joints", joint)
@@ -119,7 +129,7 @@ def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str,
         raise Unusable(
             path, f"has a position in the log that is no finite number: sample {_first(~np.isfinite(position))}"
         )
-    seconds = (time - time[0]) / 1e9
+    seconds = (time - begin) / 1e9
     steps = np.diff(time)
     if (steps <= 0).any():
         at = _first(steps <= 0)
