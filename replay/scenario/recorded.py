@@ -76,8 +76,10 @@ def _read(scenario: Scenario, file: str, data: bytes) -> dict[str, JointTrack]:
 
 def _begin(start: float, log: dict[str, JointTrack]) -> int:
     """Return the time [ns] of the log's first sample, of whichever joint."""
-    times = [track.time for track in log.values()]
-    begin, end = min(int(time.min()) for time in times), max(int(time.max()) for time in times)
+    if not log:
+        raise Unusable((*PATH, "file"), "has no samples of joints")
+    begin = min(int(track.time.min()) for track in log.values())
+    end = max(int(track.time.max()) for track in log.values())
     if begin + start * 1e9 > end:
         raise Unusable((*PATH, "start"), f"is after the log's last sample, {(end - begin) / 1e9:.6g} s after its first")
     return begin

@@ -128,6 +128,13 @@ def test_start_shifts_the_log_and_joints_of_the_same_name_need_no_mapping(tmp_pa
     assert not got[:, 1].any()  # the log has no joint `swing`
 
 
+def test_joints_that_begin_later_keep_their_times(tmp_path):
+    table = b"time,swing,lift\n10,,0\n11,0,0\n12,1,0.5\n"
+    got = positions(load(tmp_path, "{recorded: {file: log.csv}}", {"log.csv": table}))
+    np.testing.assert_allclose(got[:, 0], np.interp(FRAMES, [0, 1, 2], [0, 0, 0.5]), atol=ATOL)
+    np.testing.assert_allclose(got[:, 1], np.interp(FRAMES, [1, 2], [0, 1]), atol=ATOL)
+
+
 def test_a_recording_of_replay_moves_the_joints_as_they_were_recorded(tmp_path):
     first = load(tmp_path, "{recorded: {file: robot.mcap}}", {"robot.mcap": log("cdr")})
     paths = record(first, tmp_path / "out", rrd=False)
@@ -182,6 +189,8 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
         ),
         ("{recorded: {file: log.csv}}", {"log.csv": b"\xff\xfe"}, "cannot be read as CSV"),
         ("{recorded: {file: log.csv}}", {"log.csv": b""}, "has no column 'time'"),
+        ("{recorded: {file: log.csv, joints: {swing: {name: swing}}}}", {"log.csv": b"time,swing\n"}, "no samples"),
+        ("{recorded: {file: log.csv, start: 2 s}}", {}, "is after the log's last sample, 0.5 s after its first"),
     ],
 )
 def test_what_a_log_cannot_tell_is_refused_with_its_place(tmp_path, motion, files, message):
