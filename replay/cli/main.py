@@ -30,6 +30,9 @@ COMMANDS = {
 }
 """Help by name of command; each is the function of that name in the module of that name."""
 
+MAX_LINES = 100
+"""Lines of one error that are shown; a mistake in a sweep is one line for each of its cases."""
+
 
 class LazyGroup(click.Group):
     """A group whose commands are imported when they are used: `--help` needs none of them."""
@@ -78,8 +81,11 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
         error.show()
         return ExitCode.INVALID
     except ReplayError as error:
-        for line in str(error).splitlines():
+        lines = str(error).splitlines()
+        for line in lines[:MAX_LINES]:
             click.echo(f"replay: error: {line}", err=True)
+        if len(lines) > MAX_LINES:
+            click.echo(f"replay: error: ... and {len(lines) - MAX_LINES} more", err=True)
         return ExitCode.INVALID
     except (KeyboardInterrupt, click.Abort):
         click.echo("replay: interrupted", err=True)
