@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.values import Memory, Seconds, ShardOf
+from replay.cli.values import Memory, Seconds, ShardOf, Workers
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -33,7 +33,7 @@ format_option = click.option(
     help="Form of the result.",
 )
 _EXECUTION = (
-    click.option("--workers", type=click.IntRange(1), help="Processes; as many as there are cores when left out."),
+    click.option("--workers", type=Workers(), help="Processes; as many as there are cores when left out."),
     click.option("--timeout", type=Seconds(), help="Longest time of one scenario, such as 90s or 10min."),
     click.option("--memory", type=Memory(), help="Most resident memory of one scenario, such as 2GiB."),
     click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead."),
