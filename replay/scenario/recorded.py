@@ -69,7 +69,8 @@ def _read(scenario: Scenario, file: str, data: bytes) -> dict[str, JointTrack]:
         if kind == "mcap":
             return read_mcap(file, data, topic=written.topic or DEFAULT_TOPIC)
         column, unit = (written.time.column, written.time.unit) if written.time else ("time", "s")
-        return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9))
+        needed = {joint.name for joint in written.joints.values()} or set(_scalar_joints(scenario))
+        return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9), needed=needed)
     except RecordingError as error:
         raise Unusable((*PATH, "file"), error.reason) from None
 

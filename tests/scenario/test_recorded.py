@@ -116,6 +116,10 @@ def test_a_csv_moves_the_joints_and_empty_cells_are_no_samples(tmp_path):
     rows = "".join(f"{s * 1e3},{a},{z}\n" for s, a, z in zip(SECONDS, SWING, LIFT, strict=True))
     table = "t_ms,swing,lift\n" + rows.replace("300.0,10.0,0.1\n", "300.0,10.0,0.1\n400.0,,0.1\n")
     motion = "{recorded: {file: log.csv, time: {column: t_ms, unit: ms}, joints: {swing: {name: swing, unit: deg}}}}"
+    table = (
+        table.replace("swing,lift\n", "swing,lift,remark\n").replace(",0.4\n", ",0.4,up\n").replace("0.1\n", "0.1,\n")
+    )
+    table = table.replace("0.0\n", "0.0,\n").replace("0.2\n", "0.2,down\n")  # a column of text is of no concern
     got = positions(load(tmp_path, motion, {"log.csv": table.encode()}))
     np.testing.assert_allclose(got[:, 1], EXPECTED[:, 1], atol=ATOL)
     assert not got[:, 0].any()
