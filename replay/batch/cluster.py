@@ -18,7 +18,8 @@ from typing import Any
 from replay.batch.case import CaseOrder, CaseResult
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.worker import Prepare, Work
-from replay.errors import MissingPackageError, WorkerError, WriteError
+from replay.errors import MissingPackageError, WorkerError
+from replay.logs.part_file import write_file
 
 _SECONDS_TO_CONNECT = 30
 
@@ -103,10 +104,7 @@ def _unpacked(task: Task, future: Any) -> Ended:
         return Ended(task, Ending.CRASHED, None, f"crashed: on the cluster: {error}", 0.0, 0)
     folder = task.payload.folder
     for name, data in parcel.files.items():
-        try:
-            (folder / name).write_bytes(data)
-        except OSError as error:
-            raise WriteError(str(folder / name), error.strerror or str(error)) from None
+        write_file(folder / name, data)
     value = parcel.ended.value
     if isinstance(value, CaseResult) and value.recordings is not None:
         found = value.recordings

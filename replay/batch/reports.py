@@ -10,7 +10,8 @@ from replay.batch.history import Night, append_night, failing_since, read_histor
 from replay.batch.regress import Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
-from replay.batch.run import as_json, write
+from replay.batch.run import as_json
+from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
 
@@ -49,9 +50,9 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         },
         "unused_baselines": list(found.unused),
     }
-    write(directory / "run.json", json.dumps(summary, indent=1) + "\n")
-    write(directory / "junit.xml", junit(found).decode())
-    write(directory / "index.html", index(found, since))
+    write_file(directory / "run.json", json.dumps(summary, indent=1) + "\n")
+    write_file(directory / "junit.xml", junit(found))
+    write_file(directory / "index.html", index(found, since))
 
 
 def describe(found: Regression) -> list[str]:

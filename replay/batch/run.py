@@ -24,7 +24,8 @@ from replay.batch.cost import expected_cost
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import RESULT, earlier_result
-from replay.errors import RecordingExistsError, WriteError
+from replay.errors import RecordingExistsError
+from replay.logs.part_file import write_error, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -153,7 +154,7 @@ def run_all(
     tasks = []
     for scenario in left:
         folder = directory / scenario.name
-        write(folder / "log.txt", "")
+        write_file(folder / "log.txt", "")
         tasks.append(
             Task(scenario.name, CaseOrder(scenario, folder, model, rrd), costs[scenario.name], folder / "log.txt")
         )
@@ -176,7 +177,7 @@ def run_all(
     seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
     ordered = tuple(results[scenario.name] for scenario in scenarios)
     run = Run(directory, ordered, interrupted, started, seconds, workers)
-    write(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
+    write_file(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
     return run
 
 
@@ -226,12 +227,12 @@ def _finish(result: CaseResult, folder: Path) -> None:
         for kind in (".mcap", ".rrd"):
             with contextlib.suppress(OSError):
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
-    write(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
+    write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
     try:
         with (folder / "log.txt").open("a", encoding="utf-8") as log:
             log.writelines(f"{line}\n" for line in describe(result))
     except OSError as error:
-        raise WriteError(str(folder / "log.txt"), error.strerror or str(error)) from None
+        raise write_error(folder / "log.txt", error) from None
 
 
 def _remove_unfinished(folder: Path) -> None:
@@ -266,12 +267,3 @@ def as_json(run: Run) -> dict[str, object]:
             for result in run.results
         },
     }
-
-
-def write(path: Path, text: str) -> None:
-    """Write a text file and the folders that it needs; WriteError when that is not possible."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise WriteError(str(path), error.strerror or str(error)) from None
