@@ -44,8 +44,14 @@ def _packed(file: BinaryIO, chunk: Chunk) -> bytes:
 
 
 def scene_changes(a: McapLog, b: McapLog) -> tuple[Change, ...]:
-    """Return the bodies of the scene that differ, by name: their shape, their colour, or the link that they are on."""
+    """Return the bodies of the scene that differ, by name: their shape, their colour, or the link that they are on.
+
+    A scene that only one file has is one change.
+    """
     bodies_a, bodies_b = _bodies(a), _bodies(b)
+    if bodies_a is None or bodies_b is None:
+        counts = (None if bodies is None else f"{len(bodies)} bodies" for bodies in (bodies_a, bodies_b))
+        return () if bodies_a is bodies_b else (Change(SCENE, *counts),)
     return tuple(_changes(SCENE, bodies_a, bodies_b))
 
 
@@ -91,9 +97,9 @@ def _scene(log: McapLog) -> Any:
     return None
 
 
-def _bodies(log: McapLog) -> dict[str, str]:
+def _bodies(log: McapLog) -> dict[str, str] | None:
     scene = _scene(log)
-    return {} if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
+    return None if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
 
 
 def _described(entity: Any) -> str:
