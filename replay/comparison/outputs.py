@@ -9,7 +9,7 @@ from replay.comparison.difference import Verdict
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.runs import Case, Pair, RunDifference
-from replay.errors import WriteError
+from replay.logs.part_file import write_error
 
 
 class Outputs:
@@ -55,4 +55,4 @@ def _write(path: Path, data: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     except OSError as error:
-        raise WriteError(str(path), error.strerror or str(error)) from None
+        raise write_error(path, error) from None

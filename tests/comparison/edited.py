@@ -86,7 +86,6 @@ def write(
 
 
 def _edited(kind: Any, message: bytes, item: Edit) -> bytes:
-    import numpy as np
 
     shape = shape_of(kind.DESCRIPTOR, message)
     assert shape is not None
