@@ -78,21 +78,21 @@ class Cluster:
             client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise WorkerError(f"the Dask scheduler {self._address} does not answer ({error})") from None
-        with contextlib.closing(client), client.get_executor(pure=False) as executor:
+        with contextlib.closing(client):
+            executor = client.get_executor(pure=False)
             ordered = sorted(tasks, key=lambda task: (-task.cost, task.name))
-            futures = {executor.submit(run_remotely, task, self._settings): task for task in ordered}
-            for task in ordered:
-                self._follow(task.name, 0, 0)
-            waiting = set(futures)
             try:
+                futures = {executor.submit(run_remotely, task, self._settings): task for task in ordered}
+                for task in ordered:
+                    self._follow(task.name, 0, 0)
+                waiting = set(futures)
                 while waiting:
                     self._check()
                     done, waiting = wait(waiting, _SECONDS_BETWEEN_CHECKS, FIRST_COMPLETED)
                     for future in done:
                         yield _unpacked(futures[future], future)
             finally:
-                for future in futures:
-                    future.cancel()
+                executor.shutdown(wait=False)  # cancels what is not done; to wait for it would be to wait for a hang
 
 
 def run_remotely(task: Task, settings: dict[str, Any]) -> Parcel:
