@@ -20,7 +20,7 @@ from replay.batch.case import CaseOrder, CaseResult
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.worker import Prepare, Work
 from replay.errors import MissingPackageError, NoSpaceError, WorkerError, WriteError
-from replay.logs.part_file import write_error
+from replay.logs.part_file import write_file
 
 _SECONDS_TO_CONNECT = 30
 _SECONDS_BETWEEN_CHECKS = 0.1
@@ -133,7 +133,7 @@ def _unpacked(task: Task, future: Any) -> Ended:
     folder = task.payload.folder
     try:
         for name, data in parcel.files.items():
-            _put(folder / name, data)
+            write_file(folder / name, data)
     except NoSpaceError:
         raise
     except WriteError as error:
@@ -144,10 +144,3 @@ def _unpacked(task: Task, future: Any) -> Ended:
         moved = dataclasses.replace(found, mcap=folder / found.mcap.name, rrd=found.rrd and folder / found.rrd.name)
         value = dataclasses.replace(value, recordings=moved)
     return dataclasses.replace(parcel.ended, task=task, value=value)
-
-
-def _put(path: Path, data: bytes) -> None:
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise write_error(path, error) from None

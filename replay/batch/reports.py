@@ -10,8 +10,9 @@ from replay.batch.history import Night, append_night, failing_since, read_histor
 from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
-from replay.batch.run import as_json, write
+from replay.batch.run import as_json
 from replay.errors import WriteError
+from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
 
@@ -52,9 +53,9 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         },
         "unused_baselines": list(found.unused),
     }
-    write(directory / "run.json", json.dumps(summary, indent=1) + "\n")
-    write(directory / JUNIT, junit(found).decode())
-    write(directory / INDEX, index(found, since))
+    write_file(directory / "run.json", json.dumps(summary, indent=1) + "\n")
+    write_file(directory / JUNIT, junit(found))
+    write_file(directory / INDEX, index(found, since))
     if unknown is not None:
         raise unknown
     if not found.run.interrupted:

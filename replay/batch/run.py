@@ -26,7 +26,7 @@ from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import RESULT, earlier_result
 from replay.batch.watch import Unwatched, Watch
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError
-from replay.logs.part_file import write_error
+from replay.logs.part_file import write_error, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -128,7 +128,7 @@ def run_all(
         ended = [results.get(s.name, CaseResult(s.name, Status.INTERRUPTED, error=lost)) for s in scenarios]
         seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
         run = Run(directory, tuple(ended), interrupted, started, seconds, workers)
-        write(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
+        write_file(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
         return run
 
     write_summary()
@@ -138,7 +138,7 @@ def run_all(
         for scenario in left:
             log = directory / scenario.name / "log.txt"
             try:
-                write(log, "")
+                write_file(log, "")
             except WriteError as error:
                 results[scenario.name] = _unwritable(scenario.name, error)
                 watch.done(results[scenario.name])
@@ -210,11 +210,19 @@ def _finish(result: CaseResult, folder: Path) -> CaseResult:
             with contextlib.suppress(OSError):
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
     try:
-        write(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
-        write(folder / "log.txt", "".join(f"{line}\n" for line in describe(result)), append=True)
+        write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
+        _append(folder / "log.txt", describe(result))
     except WriteError as error:
         return dataclasses.replace(_unwritable(result.name, error), seconds=result.seconds, memory=result.memory)
     return result
+
+
+def _append(path: Path, lines: Sequence[str]) -> None:
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.writelines(f"{line}\n" for line in lines)
+    except OSError as error:
+        raise write_error(path, error) from None
 
 
 def _unwritable(name: str, error: WriteError) -> CaseResult:
@@ -256,13 +264,3 @@ def as_json(run: Run) -> dict[str, object]:
             for result in run.results
         },
     }
-
-
-def write(path: Path, text: str, *, append: bool = False) -> None:
-    """Write a text file and the folders that it needs; WriteError when that is not possible."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a" if append else "w", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise write_error(path, error) from None

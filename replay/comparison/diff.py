@@ -129,10 +129,10 @@ def _units(groups_a: Mapping[tuple[str, str], Group], groups_b: Mapping[tuple[st
 
 def _event_messages(baseline: Recording, candidate: Recording) -> Iterator[Change]:
     if baseline.events != candidate.events:
-        only_a = set(baseline.events) - set(candidate.events)
-        only_b = set(candidate.events) - set(baseline.events)
+        only_a = baseline.events.count_missing_in(candidate.events)
+        only_b = candidate.events.count_missing_in(baseline.events)
         yield Change(
             EVENTS,
-            f"{len(baseline.events)} events, {len(only_a)} of them only here",
-            f"{len(candidate.events)} events, {len(only_b)} of them only here",
+            f"{len(baseline.events)} events, {only_a} of them only here",
+            f"{len(candidate.events)} events, {only_b} of them only here",
         )

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -131,14 +132,17 @@ def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
     run = run_all([scenes.scene("bad"), scenes.scene("good")], tmp_path, rrd=False, execution=TWO)
     bad, good = run.results
     assert (bad.status, good.status) == (Status.FAILED, Status.PASSED)
-    assert bad.error.startswith(f"{tmp_path / 'bad' / 'log.txt'}: cannot be written: ")
+    assert (
+        bad.error
+        == f"{tmp_path / 'bad' / 'log.txt'}: cannot be written: {tmp_path / 'bad'} is a file where a folder is needed"
+    )
     (tmp_path / "good" / "result.json").unlink()
     (tmp_path / "good" / "result.json").mkdir()
     (again,) = run_all([scenes.scene("good")], tmp_path, rrd=False, overwrite=True, execution=TWO).results
     assert (again.status, again.recordings) == (Status.FAILED, None)
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a full disk")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
 def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path):
     (tmp_path / "good").mkdir()
     (tmp_path / "good" / "result.json").symlink_to("/dev/full")
