@@ -157,7 +157,7 @@ def _judge(
         }[missing]
     else:
         try:
-            pair = read_pair(accepted, result.recordings.mcap)
+            pair = read_pair(accepted, result.recordings.mcap, rules=rules)
         except RecordingError as error:
             verdict, message = Verdict.UNREADABLE, str(error)
         else:

@@ -163,11 +163,11 @@ from replay.cli.main import main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 read_pair = regress.read_pair
 
-def slow(baseline, candidate):
+def slow(baseline, candidate, **rules):
     if candidate.stem == "b":
         print("comparing b", flush=True)
         time.sleep(60)
-    return read_pair(baseline, candidate)
+    return read_pair(baseline, candidate, **rules)
 
 regress.read_pair = slow
 main(sys.argv[1:])

@@ -9,8 +9,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
+from replay.comparison.difference import Verdict
+from replay.comparison.rules import Rule, Rules, Tolerance
+from replay.comparison.runs import read_pair
 from replay.recording.reader import read
 from tests.batch import scenes
 from tests.comparison import edited
@@ -128,6 +132,20 @@ def test_one_value_of_one_frame(tmp_path, capsys, source, edit, name, line):
     target = edited.write(source, tmp_path / "b.mcap", [edit])
     case = check(tmp_path, capsys, source, target, line, finding=("signals", name))
     assert case["signals"][0]["frames"] == 1
+
+
+def test_topics_of_the_same_bytes_are_not_read(tmp_path):
+    target = edited.write(PARKING, tmp_path / "b.mcap", [Edit(CORNER, "distance", 300, flipped(0))])
+    pair = read_pair(PARKING, target)
+    for recording in (pair.baseline, pair.candidate):
+        assert recording.layout.distance_sensors == ("corner_head_left",)
+        assert recording.layout.links == recording.layout.pairs == recording.layout.joints == ()
+    assert pair.equal == 966 - 14
+    assert replay.diff(PARKING, target).compared == 966
+    none_may_be_nan = Rules((Rule(("/distance/corner_foot_left/*",), Tolerance(nan="fail"), "it always sees"),))
+    found = replay.diff(PARKING, target, rules=none_may_be_nan)
+    assert {item.signal.topic for item in found.signals} == {CORNER, "/distance/corner_foot_left"}
+    assert replay.diff(PARKING, PARKING, rules=none_may_be_nan).verdict is Verdict.DIFFERENT
 
 
 def test_a_negative_zero_is_equal_unless_it_may_not_be(tmp_path, capsys):
