@@ -13,10 +13,10 @@ from replay.bench.measure import Check, Contender, Goal, Row, absent, compete, e
 from replay.bench.report import Plot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
-from replay.geometry.tree import triangle_tree
+from replay.geometry.tree import Tree, triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.clusters import make_clusters
-from replay.sensing.capacitive.tree_sum import sum_tree
+from replay.sensing.capacitive.clusters import Clusters, make_clusters
+from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 Floats = NDArray[np.float64]
@@ -124,7 +124,7 @@ def _race(
     truth = sum_triangles(triangles, areas, poses, half, False, False, EXACT)[0].ravel()
 
     def by_tree(rtol: float) -> Answer:
-        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol)[0][:, 0]
+        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol, np.zeros(COUNTS, np.int64))[0][:, 0]
 
     def contender(name: str, answer: Answer, tolerance: float) -> Contender:
         return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))
@@ -181,10 +181,10 @@ def _add_growth(report: Report, *, most: int, rounds: int) -> None:
         report.notes.append(f"{name}: a plate costs like n^{exponent(points):.2f} in the number of triangles.")
 
 
-def _timed(name: str, clusters: object, tree: object, poses: Floats, rtol: float) -> Contender:
+def _timed(name: str, clusters: Clusters, tree: Tree, poses: Floats, rtol: float) -> Contender:
     return Contender(
         name,
-        lambda: sum_tree(clusters, tree, poses, PLATE, False, False, rtol)[0],  # type: ignore[arg-type]
+        lambda: sum_tree(clusters, tree, poses, PLATE, False, False, rtol, np.zeros(COUNTS, np.int64))[0],
         len(poses),
         _finite,
     )

@@ -18,6 +18,7 @@ from replay.geometry.primitives import sphere
 from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact
+from replay.sensing.distance.query import COUNTS
 from replay.sensing.distance.rays import cap_directions, sweep_rays
 from replay.sensing.distance.readings import Nearest, nothing_yet
 from replay.sensing.distance.thesis import sweep_thesis
@@ -98,8 +99,9 @@ def on_mesh(name: str, triangles: Floats, *, queries: int, counts: Sequence[int]
 def exact_sweep(target: Target) -> Sweep:
     """Return our exact sensor on a target."""
     cos_half, sin_half = half_angle(APERTURE)
+    counts = np.zeros(COUNTS, dtype=np.int64)
     return lambda poses, nearest: sweep_exact(
-        target.triangles, target.tree, poses, cos_half, sin_half, np.inf, 0, nearest
+        target.triangles, target.tree, poses, cos_half, sin_half, np.inf, 0, nearest, counts
     )
 
 
