@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.bench.cone_truth import nearest_in_cone
+from replay.bench.goals import Goal, advantage
 from replay.bench.inputs import around, box_surface, phantom, torus
-from replay.bench.measure import Check, Contender, Goal, Row, absent, compete, exponent, ratio
+from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
 from replay.bench.report import Plot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import sphere
@@ -67,11 +68,10 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
         report.plots.append(_plot(name, rows))
     large = "torus, 100 000 triangles"
     rows = report.tables.get(large, [])
-    what = "exact cone on 100 000 triangles, 30 deg, against 1000 rays of embreex"
-    report.goals.append(Goal(what, ">= 10x", ratio(rows, large, "embree, 1000 rays", EXACT), 10.0))
+    report.goals.append(advantage("cone.speed", rows, [large], "embree, 1000 rays", EXACT))
     errors = [row.worst_error for several in report.tables.values() for row in several if row.method == EXACT]
     worst = max(errors) if errors else math.nan
-    report.goals.append(Goal("exact cone, worst relative error", "<= 1e-12", worst, 1e-12, "", at_least=False))
+    report.goals.append(Goal("cone.error", worst))
     _add_growth(report, most=100_000 if quick else 1_000_000, rounds=rounds)
     return report
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from replay.bench import carm
 from replay.bench.engines import PEERS, fcl_geometry
-from replay.bench.measure import Check, Contender, Goal, absent, compete, ratio
+from replay.bench.goals import advantage
+from replay.bench.measure import Check, Contender, absent, compete
 from replay.bench.report import Report
 from replay.bench.truth import proven_distance
 from replay.collision.columns import Level
@@ -57,8 +58,7 @@ def add_to(report: Report, *, frames: int, rounds: int) -> None:
     rows += [absent(case, name, why) for name in (FCL, FCL_MANAGER) if why]
     report.tables[TITLE] = rows
     report.notes.append(f"Contacts are {expected.mean():.1%} of the pair-frames of the motion.")
-    what = f"GJK boolean, {case} of a motion, against python-fcl"
-    report.goals.append(Goal(what, ">= 10x", ratio(rows, case, FCL, OURS), 10.0))
+    report.goals.append(advantage("motion.fcl", rows, [case], FCL, OURS))
 
 
 def pipeline(poses: LinkPoses, **options: Any) -> Answer:
