@@ -70,7 +70,7 @@ def run(
     runners = {name: Runner(chosen, model) for name, model in MODELS.items()}
     count = frames or (96 if quick else chosen.frames)
     every = np.linspace(0, chosen.frames - 1, count).round().astype(int).tolist()
-    judged = every[count // 8 :: max(1, count // 4)][: 2 if quick else 4]
+    judged = [every[k] for k in np.linspace(0, count - 1, 3 if quick else 7).round().astype(int)]
     few = judged[-1:] if quick else judged[-2:]
     truth = Runner(chosen, EXACT).run(judged)
     errors, contenders = [], []

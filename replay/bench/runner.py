@@ -140,10 +140,13 @@ class Runner:
                     capacitive=found["capacitive"],
                 )
             )
-        with tempfile.TemporaryDirectory() as folder:
-            begin = time.perf_counter()
-            record_blocks(scene, blocks, folder)
-            return time.perf_counter() - begin
+        spent = 0.0
+        for _ in range(2):  # libraries are loaded on the first use
+            with tempfile.TemporaryDirectory() as folder:
+                begin = time.perf_counter()
+                record_blocks(scene, blocks, folder)
+                spent = time.perf_counter() - begin
+        return spent
 
     def _timed(self, narrow_phase: Any) -> Any:
         def decide(*arguments: Any) -> None:
