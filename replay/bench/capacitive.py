@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.bench.goals import Goal, advantage
-from replay.bench.inputs import around, box_surface, phantom, slivers, torus
-from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
+from replay.bench.inputs import around, box_surface, phantom, slivers
+from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Plot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
-from replay.geometry.tree import Tree, triangle_tree
+from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.clusters import Clusters, make_clusters
+from replay.sensing.capacitive.clusters import make_clusters
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
@@ -77,7 +77,6 @@ def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str]
         if row.method.startswith("tree")
     ]
     report.goals.append(Goal("tree.error", max(excess, default=math.nan)))
-    _add_growth(report, most=26_756 if quick else 1_000_000, rounds=rounds)
     return report
 
 
@@ -149,44 +148,3 @@ def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
 
 def _plot(name: str, rows: Sequence[Row]) -> Plot:
     return pareto_plot(name, rows, "worst relative error", {row.method: row.method.split()[0] for row in rows})
-
-
-def _add_growth(report: Report, *, most: int, rounds: int) -> None:
-    """Add the time of a plate against the number of triangles."""
-    rows: list[Row] = []
-    lines: dict[str, list[tuple[float, float]]] = {}
-    for size in (100, 1_000, 10_000, 100_000, 1_000_000):
-        if size > most:
-            continue
-        triangles = torus(size)
-        poses = np.ascontiguousarray(
-            transforms.invert(around(triangles, 20, near=0.03, far=1.5, tilt=math.radians(60.0)))[:, None]
-        )
-        tree = triangle_tree(triangles)
-        clusters = make_clusters(triangles, tree)
-        areas = triangle_areas(triangles)
-        contenders = [_timed(f"tree rtol {rtol:.0e}", clusters, tree, poses, rtol) for rtol in (1e-4, 1e-6)]
-        if size <= 100_000:
-            exact = Contender("exact", _by_triangles(triangles, areas, poses[:2], EXACT), 2, _finite)
-            contenders.append(exact)
-        found = compete(f"torus, {len(triangles)} triangles", contenders, rounds=rounds)
-        rows += found
-        for row in found:
-            lines.setdefault(row.method, []).append((float(len(triangles)), row.median))
-    report.tables["a plate against the number of triangles"] = rows
-    report.plots.append(Plot("capacitive sensor", "triangles", "s per plate", lines, joined=True))
-    for name, points in lines.items():
-        report.notes.append(f"{name}: a plate costs like n^{exponent(points):.2f} in the number of triangles.")
-
-
-def _timed(name: str, clusters: Clusters, tree: Tree, poses: Floats, rtol: float) -> Contender:
-    return Contender(
-        name,
-        lambda: sum_tree(clusters, tree, poses, PLATE, False, False, rtol, np.zeros(COUNTS, np.int64))[0],
-        len(poses),
-        _finite,
-    )
-
-
-def _finite(found: Floats) -> Check:
-    return Check(0.0, int(np.sum(~(found >= 0.0))))

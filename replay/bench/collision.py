@@ -55,7 +55,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
         for call in ("distance",)
     ]
     motion.add_to(report, frames=512 if quick else 2000, rounds=min(rounds, 5))
-    broad_phase.add_to(report, frames=512 if quick else 2000, most=1000 if quick else 10_000, rounds=min(rounds, 3))
+    report.grids["bounding volumes on the motion"] = broad_phase.tightness(512 if quick else 2000, min(rounds, 3))
     return report
 
 

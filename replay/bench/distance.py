@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from replay.bench.cone_truth import nearest_in_cone
 from replay.bench.goals import Goal, advantage
 from replay.bench.inputs import around, box_surface, phantom, torus
-from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
+from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Plot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import sphere
@@ -72,7 +72,6 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
     errors = [row.worst_error for several in report.tables.values() for row in several if row.method == EXACT]
     worst = max(errors) if errors else math.nan
     report.goals.append(Goal("cone.error", worst))
-    _add_growth(report, most=100_000 if quick else 1_000_000, rounds=rounds)
     return report
 
 
@@ -153,28 +152,6 @@ def judge(found: Floats, truth: Floats, *, exact: bool) -> Check:
 def _plot(name: str, rows: Sequence[Row]) -> Plot:
     groups = {row.method: row.method.split(",")[0] + " rays" for row in rows if row.method.endswith("rays")}
     return pareto_plot(name, rows, "worst relative error", groups)
-
-
-def _add_growth(report: Report, *, most: int, rounds: int) -> None:
-    """Add the time of an exact query against the number of triangles."""
-    rows, points = [], []
-    for size in (100, 1_000, 10_000, 100_000, 1_000_000):
-        if size > most:
-            continue
-        triangles = torus(size)
-        poses = around(triangles, 100, near=0.03, far=1.5, tilt=0.9 * APERTURE / 2.0)
-        sweep = exact_sweep(make_target("torus", 0, triangles))
-        plain = _read(sweep, poses)
-        row = compete(
-            f"torus, {len(triangles)} triangles",
-            [Contender(EXACT, plain, len(poses), lambda found: Check(0.0, int(np.sum(~np.isfinite(found)))))],
-            rounds=rounds,
-        )[0]
-        rows.append(row)
-        points.append((float(len(triangles)), row.median))
-    report.tables["an exact query against the number of triangles"] = rows
-    report.plots.append(Plot("exact cone", "triangles", "s per query", {EXACT: points}, joined=True))
-    report.notes.append(f"An exact query grows like n^{exponent(points):.2f} in the number of triangles.")
 
 
 def read_once(method: str, question: dict[str, Any], *, engine: str = "own", count: int = 1000) -> float:

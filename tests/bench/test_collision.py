@@ -90,7 +90,7 @@ def test_no_volume_loses_a_contact():
 
 def test_cost_against_bodies_is_fitted():
     report = Report("collision")
-    broad_phase.add_to(report, frames=8, most=30, rounds=1)
+    broad_phase.growth(report, most=30, rounds=1)
     (rows,) = report.tables.values()
     assert len(rows) == 4
     assert any("grows like n^" in note for note in report.notes)
