@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.bench.goals import Goal, advantage
+from replay.bench.hard_sensing import hard_plates
 from replay.bench.inputs import around, box_surface, phantom, slivers
 from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Plot, Report, pareto_plot
@@ -16,6 +17,7 @@ from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
+from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.clusters import make_clusters
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
@@ -54,6 +56,8 @@ def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str]
     rows, best = inclined_plate(rounds)
     report.tables[INCLINED] = rows
     report.plots.append(_plot(INCLINED, rows))
+    for key, worst in zip(("plate.error", "plate.slivers"), plate_errors(), strict=True):
+        report.goals.append(Goal(key, worst))
     report.notes.append(f"Experiment I: midpoint reaches 1e-6 from n = {best} on.")
     report.goals.append(advantage("plate.speed", rows, [INCLINED], f"midpoint n={best}", "exact"))
     for name in bodies:
@@ -78,6 +82,17 @@ def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str]
     ]
     report.goals.append(Goal("tree.error", max(excess, default=math.nan)))
     return report
+
+
+def plate_errors() -> tuple[float, float]:
+    """Return the closed form's worst relative errors on the hard cases of 60 digits: but for slivers, and on these."""
+    worst = {True: 0.0, False: 0.0}
+    for case in hard_plates():
+        found = plate_integral(np.array([case["triangle"]]), case["half_size"], side=case["side"])[0]
+        truth, thin = case["truth"], "sliver" in case["family"]
+        error = 0.0 if found == truth else abs(found - truth) / truth if truth else math.inf
+        worst[thin] = max(worst[thin], math.inf if math.isnan(error) else float(error))
+    return worst[False], worst[True]
 
 
 def inclined_plate(rounds: int) -> tuple[list[Row], int | None]:

@@ -45,7 +45,7 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
             rows += on(part, rounds or (3 if quick else 5))
     report.tables[TABLE] = rows
     times = {(row.case, row.method): row for row in rows if row.rounds}
-    costs = [_cost(times, name) for name in scenes if (name, BOTH) in times]
+    costs = [cost(times, name) for name in scenes if (name, BOTH) in times]
     ratios = {cost["scene"]: float(cost["with over without"]) for cost in costs}
     slopes = [float(cost["us a frame"]) for cost in costs]
     if costs:
@@ -56,7 +56,7 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
     return report
 
 
-def _cost(times: Mapping[tuple[str, str], Row], name: str) -> dict[str, str]:
+def cost(times: Mapping[tuple[str, str], Row], name: str) -> dict[str, str]:
     """Return what recording adds to a scene: to a frame, and once."""
     long = f"{name}{FINER}"
     plain, both = times[name, PLAIN], times[name, BOTH]
