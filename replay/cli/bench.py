@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import time
 from pathlib import Path
 
 import click
@@ -37,8 +38,9 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
 
     reports = []
     for name in names or BENCHMARKS:
-        note(f"bench {name} ...")
+        begin = time.perf_counter()
         reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
+        note(f"bench {name}: {time.perf_counter() - begin:.0f} s")
     for path in results.write(reports, output):
         note(f"wrote {path}")
     say(form, lambda: results.as_text(reports), lambda: results.as_json(reports))
