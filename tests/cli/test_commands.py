@@ -70,6 +70,12 @@ def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys)
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
 
+def test_without_savings_the_recording_says_so_and_reads_the_same(scenario, recorded, tmp_path):
+    assert run(["run", str(scenario), "-o", str(tmp_path / "all"), "--no-rrd", "--no-savings"]) is ExitCode.FINE
+    assert replay.read(tmp_path / "all/swing/swing.mcap").provenance.model["savings"] == "off"
+    assert run(["diff", str(recorded / "swing.mcap"), str(tmp_path / "all/swing/swing.mcap")]) is ExitCode.FINE
+
+
 def test_a_broken_expectation_is_exit_code_4_and_named(tmp_path, capsys):
     path = tmp_path / "swing.yaml"
     path.write_text(SCENARIO.replace("EXPECTED", "always"))
