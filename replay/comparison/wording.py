@@ -181,6 +181,8 @@ def summary(found: Difference) -> str:
         parts.append(f"{len(found.deciding)} of {count(found.compared, 'signal')} changed")
     if found.accepted:
         parts.append(f"{count(len(found.accepted), 'signal')} within the rules")
+    if found.expired:
+        parts.append(f"{count(len(found.expired), 'expired rule')} would have applied")
     if found.provenance:
         parts.append(f"{count(len(found.provenance), 'difference')} of provenance")
     return ", ".join(parts) or f"all {count(found.compared, 'signal')} equal in {count(found.frames.matched, 'frame')}"

@@ -117,7 +117,7 @@ def test_filters_missing_and_unused_baselines(tmp_path, capsys):
     (tmp_path / "in" / f"{made}.yaml").unlink()
     capsys.readouterr()
     assert night(tmp_path, out, "--missing-baseline", "skip", "--rrd", "none") is ExitCode.FINE
-    assert f"unused baseline: {made}" in capsys.readouterr().out
+    assert f"1 unused baseline, of no scenario given: {made}" in capsys.readouterr().out
     assert f"<li><code>{made}</code>" in (out / "index.html").read_text()
     assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
 
@@ -129,6 +129,7 @@ def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     accept = ["accept", str(out), "--baseline", str(base)]
     assert run(["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd"]) is ExitCode.FINE
     assert run([*accept, "--yes", "--reason", "first"]) is ExitCode.FINE
+    assert "no --reason" not in capsys.readouterr().err
     assert run([*accept, "--yes"]) is ExitCode.FINE
     assert "0 to be accepted, 2 unchanged" in capsys.readouterr().out
     scenes.write(tmp_path / "in", "a", distance=1.3)
