@@ -31,7 +31,9 @@ def show(form: str, run: Run) -> None:
 
 
 def exit_code(run: Run) -> ExitCode:
-    """Return what the shell is told of a run."""
+    """Return what the shell is told of a run; nothing but invalid scenarios is invalid input."""
+    if run.results and all(result.invalid for result in run.results):
+        return ExitCode.INVALID
     interrupted = ExitCode.INTERRUPTED if run.interrupted else ExitCode.FINE
     return worst([interrupted, ExitCode.FINE if run.passed else ExitCode.FAILED])
 

@@ -6,7 +6,6 @@ after it, as NaN, so that gaps stay gaps. The bytes differ from run to run; the 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import Level
-from replay.errors import WriteError
-from replay.logs.part_file import PartFile
 from replay.numerics import transforms
 from replay.recording import blueprint
 from replay.recording.events import EventFinder
+from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_scene import body_path, extent, log_curve, log_scene
 from replay.recording.scene_view import SceneView
 from replay.sensing.columns import Detection
@@ -32,7 +30,7 @@ APPLICATION = "replay"
 LEVEL_COLORS = {Level.BOUNDS: (255, 150, 20, 255), Level.CONTACT: (235, 35, 35, 255)}
 """Colours of a body while one of its pairs is at that level."""
 
-_FLUSH = 20.0  # [s] until what is left must have reached the disk
+_BLOCKS_UNWRITTEN = 8  # the library would take blocks faster than a slow disk, and memory would grow
 _LOG_LEVELS = {2: "INFO", 3: "WARN", 4: "ERROR"}
 
 
@@ -46,7 +44,7 @@ class RerunWriter:
             RecordingExistsError: it exists and may not be overwritten.
             WriteError: the file cannot be written.
         """
-        self._file = PartFile(Path(path), overwrite=overwrite)
+        self._file = RerunFile(path, overwrite=overwrite)
         self._layout = layout
         self._scene = scene
         self._events = EventFinder(layout)
@@ -57,18 +55,11 @@ class RerunWriter:
         self._members = self._bodies_of_pairs()
         self._corners = np.zeros((0, 3))
         self._end = 0
+        self._blocks = 0
 
     def prepare(self) -> None:
         """Begin the file with all that does not change."""
-        import rerun as rr
-
-        stream = rr.RecordingStream(APPLICATION)
-        # The library opens the file that is already there anew, so that the name, its folder and its rights are proven.
-        try:
-            stream.save(self._file.part)
-        except RuntimeError as error:
-            raise WriteError(str(self._file.path), str(error)) from None
-        self._stream = stream
+        self._stream = stream = self._file.open(APPLICATION)
         stream.send_recording_name(self._scene.name)
         log_scene(stream, self._scene, self._members)
 
@@ -76,7 +67,7 @@ class RerunWriter:
         """Append a block."""
         if self._stream is None:
             self.prepare()
-        if block.first == 0:
+        if self._blocks == 0:
             self._corners = extent(self._scene, block.link_poses[0])
         self._end = int(block.time[-1])
         self._index = _index(block.time, block.first + np.arange(len(block.time)))
@@ -89,36 +80,20 @@ class RerunWriter:
         everywhere = np.ones(block.joint_positions.shape, dtype=np.bool_)
         self._curves(block, blueprint.JOINTS, self._layout.joints, block.joint_positions, everywhere, titles)
         self._log_events(block)
+        self._blocks += 1
+        if self._blocks % _BLOCKS_UNWRITTEN == 0:
+            self._file.flush()
 
     def close(self) -> None:
         """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""
         if self._stream is not None:
             charts = sorted({chart for chart, _ in self._named})
             self._stream.send_blueprint(blueprint.blueprint(charts, self._corners, self._end), make_active=False)
-            try:  # on a full disk the library's writing thread is gone, and may leave a flush without an answer
-                self._stream.flush(timeout_sec=_FLUSH)
-            except Exception as error:
-                raise WriteError(str(self._file.path), f"not all of it was written: {error}") from None
-            self._stream.disconnect()
-            self._check_footer()
         self._file.commit()
 
     def discard(self) -> None:
         """Give the recording up and remove the unfinished file."""
-        if self._stream is not None:
-            self._stream.disconnect()
         self._file.discard()
-
-    def _check_footer(self) -> None:
-        """Read the end of the file back: the library only logs that a disk is full."""
-        from rerun.chunk import RrdReader
-
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                RrdReader(str(self._file.part)).recordings()
-        except Exception as error:  # a missing footer is a warning of its own class, damage any of several errors
-            raise WriteError(str(self._file.path), f"it did not reach the disk whole ({error})") from None
 
     def _send(self, block: FrameBlock, rows: Flags, path: list[str], *columns: Any) -> None:
         import rerun as rr
