@@ -62,18 +62,23 @@ def check_night(tmp_path, monkeypatch, *, plain, bad, differing):
     monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
     out = tmp_path / "night"
     assert night(tmp_path, out) is ExitCode.FAILED
-    counted = {"plain": "same", "differ": "different", "crash": "crashed", "hang": "timeout", "eat": "memory"}
-    found = verdicts_of(out)
-    assert found == {name: counted[name.split("_")[0]] for name in found}
-    assert len(found) == plain + 3 * bad + differing
-    tags = {"same": "pass", "different": "failure"}
-    assert junit_of(out) == {name: tags.get(verdict, "error") for name, verdict in found.items()}
+    check_verdicts(out, plain, bad, differing)
     assert {process.pid for process in psutil.Process().children(recursive=True)} == before
     for kind in ("crash", "hang", "eat"):
         for k in range(bad):
             (tmp_path / "in" / f"{kind}_{k}.yaml").unlink()
     assert night(tmp_path, out) is ExitCode.DIFFERENT
     return out
+
+
+def check_verdicts(out, plain, bad, differing):
+    """Check that run.json and junit.xml give each scenario the verdict of its name."""
+    counted = {"plain": "same", "differ": "different", "crash": "crashed", "hang": "timeout", "eat": "memory"}
+    found = verdicts_of(out)
+    assert found == {name: counted[name.split("_")[0]] for name in found}
+    assert len(found) == plain + 3 * bad + differing
+    tags = {"same": "pass", "different": "failure"}
+    assert junit_of(out) == {name: tags.get(verdict, "error") for name, verdict in found.items()}
 
 
 def test_a_night_gives_exactly_the_verdicts_of_its_scenarios(tmp_path, monkeypatch, capsys):
