@@ -77,8 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     files and takes the viewer with it.
     """
     interruption.install()
-    code = run(arguments)
-    sys.exit(int(ExitCode.INTERRUPTED if interruption.requested() else code))
+    code = ExitCode.INTERRUPTED
+    try:
+        code = run(arguments)
+        interrupted = interruption.over()
+    except KeyboardInterrupt:  # at the command's very end
+        interrupted = interruption.over()
+    sys.exit(int(ExitCode.INTERRUPTED if interrupted else code))
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:

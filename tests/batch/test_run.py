@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -16,7 +17,7 @@ from replay.batch.cost import expected_cost
 from replay.batch.prepare import needs_of
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.batch.shard import Shard
-from replay.errors import InvalidValue, RecordingExistsError
+from replay.errors import InvalidValue, NoSpaceError, RecordingExistsError
 from replay.scenario.methods import BUILTIN_MODELS, Model
 from tests.batch import scenes
 
@@ -149,6 +150,30 @@ def test_shards_are_all_scenarios_each_once_and_about_equally_long():
     for wrong in ("0/2", "3/2", "1", "a/b"):
         with pytest.raises(InvalidValue, match="must be i/n"):
             Shard.parse(wrong)
+
+
+def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
+    (tmp_path / "bad").write_text("where its folder should be")
+    run = run_all([scenes.scene("bad"), scenes.scene("good")], tmp_path, rrd=False, execution=TWO)
+    bad, good = run.results
+    assert (bad.status, good.status) == (Status.FAILED, Status.PASSED)
+    assert (
+        bad.error
+        == f"{tmp_path / 'bad' / 'log.txt'}: cannot be written: {tmp_path / 'bad'} is a file where a folder is needed"
+    )
+    (tmp_path / "good" / "result.json").unlink()
+    (tmp_path / "good" / "result.json").mkdir()
+    (again,) = run_all([scenes.scene("good")], tmp_path, rrd=False, overwrite=True, execution=TWO).results
+    assert (again.status, again.recordings) == (Status.FAILED, None)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path):
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "result.json").symlink_to("/dev/full")
+    with pytest.raises(NoSpaceError):
+        run_all([scenes.scene("good"), scenes.scene("other")], tmp_path, rrd=False, execution=TWO)
+    assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal as a terminal does")
