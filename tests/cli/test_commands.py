@@ -105,6 +105,18 @@ def test_validate_says_place_value_rule_and_remedy(tmp_path, capsys):
     assert "60 cm" in error
 
 
+def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        "version: 1\nname: many\nrate: 10\nduration: 1\nlinks: {a: {shapes: {s: {type: cube, size: 1}}}}\n"
+        f"sweep: {{grid: {{links.a.shapes.s.size: {[-k for k in range(1000)]}}}}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.INVALID
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 101
+    assert lines[-1] == "replay: error: ... and 900 more"
+
+
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
     entry = json.loads(capsys.readouterr().out)[0]
