@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.gjk import distance, intersect
-from replay.collision.gjk_exact import CONTACT, DISTANCE, SEPARATED, Workspace
+from replay.collision.gjk_exact import CONTACT, DISTANCE, SEPARATED, workspace
 from replay.collision.gjk_kernel import query
 from replay.collision.support import Sets, make_sets
 from replay.geometry.convex import from_pieces
@@ -72,7 +72,7 @@ class Engine:
 def sets_of(vertices: Floats) -> Sets:
     """Return one convex set as the kernels read it."""
     body = from_pieces([vertices])
-    return make_sets(body.vertices, body.first, body.neighbors_first, body.neighbors)
+    return make_sets(body.vertices, body.first)
 
 
 @kernel
@@ -81,7 +81,7 @@ def answer_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, ans
 
     Every query starts afresh, so that it costs what an unrelated query costs. `reach` is max|a| + max|b|.
     """
-    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
+    work = workspace()
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for k in range(len(T_a_b)):
         square = 0.0

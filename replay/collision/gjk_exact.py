@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from replay.collision import double_double as dd
 from replay.collision import exact_simplex
-from replay.collision.support import Sets
+from replay.collision.support import Sets, candidates
 from replay.numerics.double_double import two_sum
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -40,6 +40,9 @@ CLOSED = 2.0**-48
 
 SAFE = 1.0 - 2.0**-50
 """Keeps a lower bound below what its last division and root may have added."""
+
+LISTED = 2.0**-44
+"""A set's table is used if it leaves out only what is lower by this part of the size: rounding reaches 2^-50."""
 
 NO_PROGRESS = 1.0 + 2.0**-80
 """A squared distance that grows by more than this factor ends the search. Equal ones go on: they still turn v."""
@@ -64,10 +67,16 @@ class Workspace(NamedTuple):
     precise: Floats  # (4, 3, 2)
 
 
-@leaf_kernel
+@kernel
+def workspace() -> Workspace:
+    """Return fresh scratch for queries."""
+    return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
+
+
+@inlined_kernel
 def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[float, float, float]:
     """Return B's vertex i in A's frame, rounded."""
-    x, y, z = b.vertices[i, 0], b.vertices[i, 1], b.vertices[i, 2]
+    x, y, z = b.flat[3 * i], b.flat[3 * i + 1], b.flat[3 * i + 2]
     return (
         rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
         rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
@@ -75,7 +84,17 @@ def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[floa
     )
 
 
-@leaf_kernel
+@inlined_kernel
+def turned_back(rotation: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a direction of A's frame along B's axes."""
+    return (
+        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
+        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
+        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
+    )
+
+
+@inlined_kernel
 def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) -> int:
     """Drop the points (4, 3) of weight 0 from a simplex of n, in place; return how many remain."""
     kept = 0
@@ -90,7 +109,7 @@ def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) 
     return kept
 
 
-@leaf_kernel
+@inlined_kernel
 def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work: Workspace) -> None:
     """Write the points of A and B that the simplex and its weights stand for, in A's frame."""
     result = work.result
@@ -109,7 +128,7 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
         result[POINT_B + 2] += weight * z
 
 
-@leaf_kernel
+@inlined_kernel
 def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: Floats, translation: Floats) -> None:
     x, y, z = mapped(b, j, rotation, translation)
     points[k, 0, 0], points[k, 0, 1] = two_sum(a.vertices[i, 0], -x)
@@ -119,28 +138,37 @@ def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: F
 
 @leaf_kernel
 def _farthest(
-    sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, margin: float
+    sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, size: float
 ) -> int:
     """Return the vertex row of set k farthest along a direction (A's frame), compared in double-doubles."""
-    best = int(sets.first[k])
-    top = -np.inf
     x, y, z = direction[0][0], direction[1][0], direction[2][0]
-    for i in range(sets.first[k], sets.first[k + 1]):
-        px, py, pz = sets.vertices[i, 0], sets.vertices[i, 1], sets.vertices[i, 2]
-        if is_b:
-            px, py, pz = mapped(sets, i, rotation, translation)
-        top = max(top, px * x + py * y + pz * z)
-    highest = (-np.inf, 0.0)
-    for i in range(sets.first[k], sets.first[k + 1]):
-        px, py, pz = sets.vertices[i, 0], sets.vertices[i, 1], sets.vertices[i, 2]
-        if is_b:
-            px, py, pz = mapped(sets, i, rotation, translation)
-        if px * x + py * y + pz * z >= top - margin:
-            height = dd.dot(((px, 0.0), (py, 0.0), (pz, 0.0)), direction)
+    begin, end = sets.first[k], sets.first[k + 1]
+    listed = sets.side[k] > 0 and sets.margin[k] > LISTED * size
+    if listed:
+        u, v, w = turned_back(rotation, x, y, z) if is_b else (x, y, z)
+        begin, end = candidates(sets, sets.table[k], sets.side[k], u, v, w)
+    top = -np.inf
+    for e in range(begin, end):
+        p = _placed(sets, sets.candidates[e] if listed else e, rotation, translation, is_b)
+        top = max(top, p[0] * x + p[1] * y + p[2] * z)
+    top -= 2.0**-48 * size * (abs(x) + abs(y) + abs(z))
+    best, highest = 0, (-np.inf, 0.0)
+    for e in range(begin, end):
+        i = sets.candidates[e] if listed else e
+        p = _placed(sets, i, rotation, translation, is_b)
+        if p[0] * x + p[1] * y + p[2] * z >= top:
+            height = dd.dot(((p[0], 0.0), (p[1], 0.0), (p[2], 0.0)), direction)
             if dd.is_less(highest, height):
-                highest = height
-                best = i
+                highest, best = height, i
     return best
+
+
+@inlined_kernel
+def _placed(sets: Sets, i: int, rotation: Floats, translation: Floats, is_b: bool) -> tuple[float, float, float]:
+    """Return vertex i in A's frame."""
+    if is_b:
+        return mapped(sets, i, rotation, translation)
+    return sets.flat[3 * i], sets.flat[3 * i + 1], sets.flat[3 * i + 2]
 
 
 @leaf_kernel
@@ -179,9 +207,8 @@ def refine(
         for k in range(n):
             _point(points, k, a, simplex[k, 0], b, simplex[k, 1], rotation, translation)
         backward = (dd.negative(v[0]), dd.negative(v[1]), dd.negative(v[2]))
-        margin = 2.0**-48 * size * length
-        i = _farthest(a, set_a, rotation, translation, backward, False, margin)
-        j = _farthest(b, set_b, rotation, translation, v, True, margin)
+        i = _farthest(a, set_a, rotation, translation, backward, False, size)
+        j = _farthest(b, set_b, rotation, translation, v, True, size)
         _point(points, n, a, i, b, j, rotation, translation)
         lower = SAFE * (dd.dot(v, exact_simplex.corner(points, n))[0] / length) - ROUNDING * size
         if lower > result[LOWER]:
