@@ -116,8 +116,11 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
     for axis in range(3):
         result[POINT_A + axis] = 0.0
         result[POINT_B + axis] = 0.0
+    total = 0.0
     for k in range(work.simplex[4, 0]):
-        weight = work.weights[k]
+        total += work.weights[k]
+    for k in range(work.simplex[4, 0]):
+        weight = work.weights[k] / total
         i = work.simplex[k, 0]
         x, y, z = mapped(b, work.simplex[k, 1], rotation, translation)
         result[POINT_A] += weight * a.vertices[i, 0]

@@ -120,23 +120,21 @@ def query(
         w = (a.flat[3 * i] - x, a.flat[3 * i + 1] - y, a.flat[3 * i + 2] - z)
         along = faces.dot(d, w)
         if along > 0.0:
-            norm = math.sqrt(faces.dot(d, d))
-            lower = along / norm - bound
+            lower = along / math.sqrt(faces.dot(d, d)) - bound
             if lower > result[LOWER]:
                 result[LOWER] = lower
-                result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -d[0] / norm, -d[1] / norm, -d[2] / norm
-            if result[LOWER] > 0.0:
-                length = math.sqrt(square)
-                if result[LOWER] > cutoff:
-                    result[DISTANCE] = length
+                result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -d[0], -d[1], -d[2]
+                if lower > cutoff:
+                    result[DISTANCE] = lower
                     return SEPARATED
-                if n > 0 and length - result[LOWER] <= CLOSED * length + slack:
-                    witness = _witness_distance(points, n, weights)
-                    if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
-                        break  # a sliver's normal was off, and v with it
-                    result[DISTANCE] = length
-                    write_witness(a, b, rotation, translation, work)
-                    return SEPARATED
+            length = math.sqrt(square)
+            if n > 0 and length - result[LOWER] <= CLOSED * length + slack:
+                witness = _witness_distance(points, n, weights)
+                if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
+                    break  # a sliver's normal was off, and v with it
+                result[DISTANCE] = length
+                write_witness(a, b, rotation, translation, work)
+                return SEPARATED
         repeated = False
         for k in range(n):
             repeated = repeated or (simplex[k, 0] == i and simplex[k, 1] == j)
@@ -165,12 +163,13 @@ def _between_means(
 @inlined_kernel
 def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
     """Return the distance from the origin of the point of the simplex that the weights stand for."""
-    x, y, z = 0.0, 0.0, 0.0
+    x, y, z, total = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         x += weights[k] * points[k, 0]
         y += weights[k] * points[k, 1]
         z += weights[k] * points[k, 2]
-    return math.sqrt(x * x + y * y + z * z)
+        total += weights[k]
+    return math.sqrt(x * x + y * y + z * z) / total
 
 
 @inlined_kernel

@@ -60,11 +60,11 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
     total = dot(e, e)
     if along <= 0.0 or total == 0.0:
         return a, dot(a, a), 1.0, 0.0
-    if along >= total:
+    rest = total - along
+    if rest <= 0.0:
         return b, dot(b, b), 0.0, 1.0
-    t = along / total
-    v = cross(e, cross(a if t <= 0.5 else b, e))
-    return v, dot(v, v) / total / total, 1.0 - t, t
+    v = cross(e, cross(a if along <= rest else b, e))
+    return v, dot(v, v) / (total * total), rest, along
 
 
 @inlined_kernel
@@ -100,10 +100,9 @@ def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
         return _nearest_on_border(a, b, c)
     # face region
     height = dot(n, a)
-    weight_b, weight_c = share_b / total, share_c / total
     if height < 0.0:
         n = (-n[0], -n[1], -n[2])
-    return n, height * height / total, 1.0 - weight_b - weight_c, weight_b, weight_c
+    return n, height * height / total, share_a, share_b, share_c
 
 
 @leaf_kernel
@@ -137,7 +136,7 @@ def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) 
     origin = (0.0, 0.0, 0.0)
     if volume > 4.0 * limit:
         if least > limit:
-            return INSIDE, origin, 0.0, sa / volume, sb / volume, sc / volume, sd / volume
+            return INSIDE, origin, 0.0, sa, sb, sc, sd
         if least >= -limit:
             return UNSURE, origin, 0.0, 0.0, 0.0, 0.0, 0.0
     else:
