@@ -13,6 +13,8 @@ to e to its own last digit, which p + t e is only to the last digit of p. Faces 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,10 @@ Floats = NDArray[np.float64]
 
 DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
+
+
+WITNESS = 2.0**-44
+"""Largest accepted distance, over size, of the two points that the weights of a contact stand for."""
 
 
 @leaf_kernel
@@ -44,11 +50,13 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
         n: number of corners.
         newest: the corner that the nearest point's feature must have; -1 for any.
         size: bound on the corners' distance from the origin.
-        weights: (4,) barycentric coordinates of the nearest point, out.
+        weights: (4,) shares of the corners in the nearest point, out. Inside a tetrahedron so flat that its shares are
+            mostly rounding, they are those of its nearest corner, edge or face.
     """
     zero = (0.0, 0.0)
     best_point = (zero, zero, zero)
-    if n == 4 and _contains_origin(points, size, weights):
+    inside = n == 4 and _contains_origin(points, size, weights)
+    if inside and residual(points, n, weights) <= WITNESS * size:
         return True, best_point, zero
     best = (np.inf, 0.0)
     weights[:] = 0.0
@@ -104,7 +112,19 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             best_point = foot
             weights[:] = 0.0
             weights[i], weights[j], weights[k] = of_p[0] / total[0], of_q[0] / total[0], of_r[0] / total[0]
-    return False, best_point, best
+    return inside, best_point, best
+
+
+@leaf_kernel
+def residual(points: Floats, n: int, weights: Floats) -> float:
+    """Return how far the weighted mean of the points is from the origin."""
+    x, y, z, total = 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        x += weights[k] * points[k, 0, 0]
+        y += weights[k] * points[k, 1, 0]
+        z += weights[k] * points[k, 2, 0]
+        total += weights[k]
+    return math.sqrt(x * x + y * y + z * z) / total
 
 
 @leaf_kernel
@@ -117,5 +137,5 @@ def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     volume = a[0] + b[0] + c[0] + d[0]
     sign = -1.0 if volume < 0.0 else 1.0
     limit = 2.0**-96 * size * size * size
-    weights[0], weights[1], weights[2], weights[3] = a[0] / volume, b[0] / volume, c[0] / volume, d[0] / volume
+    weights[0], weights[1], weights[2], weights[3] = sign * a[0], sign * b[0], sign * c[0], sign * d[0]
     return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision import simplex as faces
+from replay.collision.exact_simplex import WITNESS
 from replay.collision.gjk_exact import (
     CONTACT,
     DIRECTION,
@@ -105,6 +106,8 @@ def query(
             place, d, square, wa, wb, wc, wd = _nearest(points, n, size)
             weights[0], weights[1], weights[2], weights[3] = wa, wb, wc, wd
             if place == faces.INSIDE:
+                if not _witness_distance(points, n, weights) <= WITNESS * size:
+                    break  # a flat tetrahedron: its shares are mostly rounding
                 result[DISTANCE] = 0.0
                 write_witness(a, b, rotation, translation, work)
                 return CONTACT
