@@ -27,6 +27,14 @@ DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
 
 
+SHARED = 2.0**-192
+"""Squared rounding error of a corner's share over its factors. With a newest corner, a share that is 0 to rounding
+counts: the foot moves by nothing, but its direction is then orthogonal to the whole feature, which tells the next
+support point from this one where a sheet of 1e-16 of the size is all there is to go through."""
+
+LEAST = 1e-60
+"""Weight of a corner whose share is rounding only, so that it is kept."""
+
 WITNESS = 2.0**-44
 """Largest accepted distance, over size, of the two points that the weights of a contact stand for."""
 
@@ -76,7 +84,10 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             e = dd.difference(q, p)
             total = dd.dot(e, e)
             of_p, of_q = dd.dot(q, e), dd.negative(dd.dot(p, e))
-            if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(total)):
+            if not dd.is_positive(total):
+                continue
+            lengths = (total[0] * dd.dot(q, q)[0], total[0] * dd.dot(p, p)[0])
+            if not (_shares(of_p, lengths[0], newest) and _shares(of_q, lengths[1], newest)):
                 continue
             turned = dd.cross(e, dd.cross(p if of_p[0] >= of_q[0] else q, e))
             foot = (dd.divide(turned[0], total), dd.divide(turned[1], total), dd.divide(turned[2], total))
@@ -85,7 +96,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
                 best = square
                 best_point = foot
                 weights[:] = 0.0
-                weights[i], weights[j] = of_p[0] / total[0], of_q[0] / total[0]
+                weights[i], weights[j] = max(of_p[0] / total[0], LEAST), max(of_q[0] / total[0], LEAST)
     for skipped in range(4):
         i = 0 if skipped > 0 else 1
         j = 1 if skipped > 1 else 2
@@ -103,7 +114,10 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             dd.dot(normal, dd.cross(r, p)),
             dd.dot(normal, dd.cross(p, q)),
         )
-        if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(of_r)):
+        pp, qq, rr = total[0] * dd.dot(p, p)[0], dd.dot(q, q)[0], dd.dot(r, r)[0]
+        if not (_shares(of_p, total[0] * qq * rr, newest) and _shares(of_q, pp * rr, newest)):
+            continue
+        if not _shares(of_r, pp * qq, newest):
             continue
         foot = dd.scale(dd.divide(dd.dot(normal, p), total), normal)
         square = dd.dot(foot, foot)
@@ -111,8 +125,15 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             best = square
             best_point = foot
             weights[:] = 0.0
-            weights[i], weights[j], weights[k] = of_p[0] / total[0], of_q[0] / total[0], of_r[0] / total[0]
+            weights[i], weights[j] = max(of_p[0] / total[0], LEAST), max(of_q[0] / total[0], LEAST)
+            weights[k] = max(of_r[0] / total[0], LEAST)
     return inside, best_point, best
+
+
+@leaf_kernel
+def _shares(share: dd.Number, square: float, newest: int) -> bool:
+    """Return whether a corner has a part in a feature's foot, `square` being that of the factors of its share."""
+    return dd.is_positive(share) or (newest >= 0 and share[0] * share[0] <= SHARED * square)
 
 
 @leaf_kernel

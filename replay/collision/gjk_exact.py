@@ -32,6 +32,10 @@ ITERATIONS = 128
 TOUCHING = 2.0**-90
 """Sets nearer than this times their size touch."""
 
+INDISTINCT = 2.0**-53
+"""Where neither a separating plane nor a nearer pair of points is found, points nearer than this times size are a
+contact: coordinates are rounded by as much. Sheets of 1e-16 of their size through each other end here, 1 in 2 000."""
+
 ROUNDING = 2.0**-94
 """Bound of the error of a lower bound on the gap, over size, in double-doubles."""
 
@@ -43,9 +47,6 @@ SAFE = 1.0 - 2.0**-50
 
 LISTED = 2.0**-44
 """A set's table is used if it leaves out only what is lower by this part of the size: rounding reaches 2^-50."""
-
-NO_PROGRESS = 1.0 + 2.0**-80
-"""A squared distance that grows by more than this factor ends the search. Equal ones go on: they still turn v."""
 
 # What a query leaves in `Workspace.result`.
 DISTANCE = 0  # distance of the two witness points: an upper bound [m]
@@ -225,7 +226,8 @@ def refine(
             break
         simplex[n, 0], simplex[n, 1] = i, j
         inside, nearer, square_nearer = exact_simplex.nearest(points, n + 1, n, size, weights)
-        if not inside and not square_nearer[0] <= NO_PROGRESS * square[0]:
+        # equal lengths go on, since they still turn v; one that grows by more than its rounding ends the search
+        if not inside and not math.sqrt(square_nearer[0]) <= length + ROUNDING * size:
             break
         v, square = nearer, square_nearer
         n += 1
@@ -235,4 +237,7 @@ def refine(
     write_witness(a, b, rotation, translation, work)
     if result[LOWER] > 0.0:
         return SEPARATED
+    if result[DISTANCE] <= INDISTINCT * size:
+        result[DISTANCE] = 0.0
+        return CONTACT
     return UNDECIDED
