@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import double_double as dd
+from replay.numerics import double_double as dd
 from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def corner(points: Floats, i: int) -> dd.Vector:
 
 
 @leaf_kernel
-def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
+def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Pair]:
     """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
 
     Args:
@@ -131,7 +131,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
 
 
 @leaf_kernel
-def _shares(share: dd.Number, square: float, newest: int) -> bool:
+def _shares(share: dd.Pair, square: float, newest: int) -> bool:
     """Return whether a corner has a part in a feature's foot, `square` being that of the factors of its share."""
     return dd.is_positive(share) or (newest >= 0 and share[0] * share[0] <= SHARED * square)
 

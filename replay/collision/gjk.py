@@ -20,6 +20,7 @@ from replay.numerics.arguments import as_floats
 
 Floats = NDArray[np.float64]
 
+
 class Status(enum.Enum):
     """The three answers about a pair of convex sets."""
 

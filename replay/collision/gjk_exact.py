@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import double_double as dd
 from replay.collision import exact_simplex
 from replay.collision.support import Sets, candidates
-from replay.numerics.double_double import two_sum
+from replay.numerics import double_double as dd
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
@@ -49,9 +48,9 @@ LISTED = 2.0**-44
 """A set's table is used if it leaves out only what is lower by this part of the size: rounding reaches 2^-50."""
 
 # What a query leaves in `Workspace.result`.
-DISTANCE = 0  # distance of the two witness points: an upper bound [m]
+DISTANCE = 0  # distance of the two witness points: an upper bound [m]; a lower one where that was above the cutoff
 LOWER = 1  # verified lower bound on the distance [m]
-DIRECTION = 2  # unit vector from A to B that separates by LOWER, 3 numbers
+DIRECTION = 2  # vector from A to B, of any length, that separates by LOWER, 3 numbers
 POINT_A = 5  # witness points, in A's frame, 3 numbers each
 POINT_B = 8
 STEPS = 11  # iterations in doubles and double-doubles
@@ -135,9 +134,9 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
 @inlined_kernel
 def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: Floats, translation: Floats) -> None:
     x, y, z = mapped(b, j, rotation, translation)
-    points[k, 0, 0], points[k, 0, 1] = two_sum(a.vertices[i, 0], -x)
-    points[k, 1, 0], points[k, 1, 1] = two_sum(a.vertices[i, 1], -y)
-    points[k, 2, 0], points[k, 2, 1] = two_sum(a.vertices[i, 2], -z)
+    points[k, 0, 0], points[k, 0, 1] = dd.two_sum(a.vertices[i, 0], -x)
+    points[k, 1, 0], points[k, 1, 1] = dd.two_sum(a.vertices[i, 1], -y)
+    points[k, 2, 0], points[k, 2, 1] = dd.two_sum(a.vertices[i, 2], -z)
 
 
 @leaf_kernel

@@ -1,10 +1,10 @@
 """GJK on two convex vertex sets: do they meet, and how far apart are they; in doubles, with proofs.
 
 A and B meet iff the Minkowski difference A - B holds the origin; their distance is its distance to the origin. The loop
-keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance), and
-asks for the point w of A - B that is lowest along v. Nothing in A - B is lower, so v.w/|v| is a lower bound on the
-distance along -v/|v|, and w is the simplex's next point. Without a simplex to start from, v is the mean of B's vertices
-subtracted from that of A's.
+keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance) as a
+direction d of any length, and asks for the point w of A - B that is lowest along d. Nothing in A - B is lower, so
+d.w/|d| is a lower bound on the distance along -d, and w is the simplex's next point. Without a simplex to start from,
+d is the mean of B's vertices subtracted from that of A's. Divisions and roots wait until a bound is worth having.
 
 Nothing is answered without a proof:
 - SEPARATED: a lower bound minus its rounding error is above `cutoff` (0 asks for the boolean, inf for the distance),
@@ -58,6 +58,7 @@ ROUNDING = 32.0 * 2.0**-53
 
 CLOSED = 1e-12
 """Relative duality gap at which a distance is accepted."""
+
 
 @inlined_kernel
 def query(
@@ -177,7 +178,7 @@ def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
 
 @inlined_kernel
 def _nearest(points: Floats, n: int, size: float) -> faces.Near4:
-    """Return (OUTSIDE | INSIDE | UNSURE, x, y, z): the simplex's point nearest to the origin, its weights written."""
+    """Return `simplex.nearest_on_tetrahedron` of the first n points, 1 to 4."""
     a = (points[0, 0], points[0, 1], points[0, 2])
     if n == 1:
         return faces.OUTSIDE, a, faces.dot(a, a), 1.0, 0.0, 0.0, 0.0

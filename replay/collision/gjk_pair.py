@@ -127,7 +127,7 @@ def _place(points: Floats, pose: Floats, half: Floats, sign: float, placed: Floa
 
 @leaf_kernel
 def _center(a: Floats, b: Floats, shift: Floats) -> float:
-    """Subtract an origin in place, per axis a value for which no subtraction rounds, else 0; return the largest left."""
+    """Subtract an origin in place, per axis one for which nothing rounds, else 0; return the largest that is left."""
     largest = 0.0
     for k in range(3):
         low, high = a[0, k], a[0, k]

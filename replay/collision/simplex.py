@@ -3,10 +3,13 @@
 This is the fast half of GJK's inner step. It may err on nearly degenerate simplices; it never says so itself, because
 `gjk_kernel` accepts nothing without a verified bound and hands every doubtful query to `exact_simplex`.
 
+The nearest point is returned as a direction of any length, its squared distance, and the corners' shares in it: weights
+times a common positive factor, 0 for corners without a part. So nothing is divided that is not compared.
+
 Triangle with corners a, b, c and normal n = (b - a) x (c - a): the foot of the perpendicular from the origin has the
 barycentric coordinates n.(b x c), n.(c x a), n.(a x b), over n.n. The Voronoi regions of its corners and edges follow
-C. Ericson, Real-Time Collision Detection, 5.1.5. In the face region the nearest point is n (n.a)/(n.n): its direction
-is as good as the normal's, however near the origin is, where a weighted sum of corners would cancel.
+C. Ericson, Real-Time Collision Detection, 5.1.5. In the face region the nearest point is n (n.a)/(n.n): its direction,
++-n, is as good as the normal, however near the origin is, where a weighted sum of corners would cancel.
 
 Segment with ends a, b and e = b - a: the foot of the perpendicular is e x (a x e)/(e.e), orthogonal to e to its own
 last digit, which a + t e is only to the last digit of a.
@@ -54,7 +57,7 @@ def difference(u: Point, v: Point) -> Point:
 
 @inlined_kernel
 def nearest_on_segment(a: Point, b: Point) -> Near2:
-    """Return the direction and squared length of the segment's point nearest to the origin, and the weights of a, b."""
+    """Return direction and squared distance of the segment's point nearest to the origin, and the shares of a and b."""
     e = difference(b, a)
     along = -dot(a, e)
     total = dot(e, e)
@@ -69,7 +72,7 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
 
 @inlined_kernel
 def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
-    """Return the same of the triangle abc, and the weights of a, b and c."""
+    """Return direction and squared distance of the triangle's point nearest to the origin, and the corners' shares."""
     u, v = difference(b, a), difference(c, a)
     # corner regions
     au, av = -dot(u, a), -dot(v, a)
@@ -121,7 +124,7 @@ def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
 
 @inlined_kernel
 def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
-    """Return (OUTSIDE | INSIDE | UNSURE, direction, squared length, weights of a, b, c, d).
+    """Return (OUTSIDE | INSIDE | UNSURE, direction, squared distance, shares of a, b, c, d).
 
     UNSURE if rounding may put the origin on either side. The point is the tetrahedron's nearest to the origin if
     OUTSIDE; if INSIDE it is the origin. `size` bounds the coordinates that the corners are differences of.

@@ -163,9 +163,7 @@ def candidates(sets: Sets, table: int, side: int, x: float, y: float, z: float) 
 
 
 @inlined_kernel
-def farthest(
-    sets: Sets, begin: int, end: int, table: int, side: int, x: float, y: float, z: float
-) -> int:
+def farthest(sets: Sets, begin: int, end: int, table: int, side: int, x: float, y: float, z: float) -> int:
     """Return the row in begin:end of `vertices` that is farthest along (x, y, z), for the set with that table."""
     best, top = begin, -np.inf
     if side > 0:
