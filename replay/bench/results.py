@@ -11,7 +11,7 @@ from typing import Any
 from replay.bench import goals
 from replay.bench.page import page, png
 from replay.bench.report import Report, align, machine
-from replay.errors import WriteError
+from replay.logs.part_file import write_file
 
 
 def as_text(reports: Sequence[Report]) -> str:
@@ -61,13 +61,7 @@ def write(reports: Sequence[Report], directory: Path) -> list[Path]:
     headlines = [plot for report in reports for plot in report.plots if plot.headline]
     if headlines:
         files["bench.png"] = png(*headlines)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        for name, content in files.items():
-            (directory / name).write_bytes(content)
-    except OSError as error:
-        raise WriteError(str(directory), error.strerror or str(error)) from error
-    return [directory / name for name in files]
+    return [write_file(directory / name, content) for name, content in files.items()]
 
 
 def _goals(reports: Sequence[Report]) -> list[goals.Goal]:
