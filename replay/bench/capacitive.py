@@ -162,4 +162,5 @@ def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
 
 
 def _plot(name: str, rows: Sequence[Row]) -> Plot:
-    return pareto_plot(name, rows, "worst relative error", {row.method: row.method.split()[0] for row in rows})
+    groups = {row.method: row.method.split()[0] for row in rows}
+    return pareto_plot(name, rows, "worst relative error", groups, headline=name == LARGE)

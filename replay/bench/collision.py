@@ -37,16 +37,16 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
 
     Args:
         quick: fewer queries and frames; about a minute.
-        rounds: times that every contender is timed; 21, or 11 when quick, if None.
+        rounds: times that every contender is timed; 9, or 5 when quick, if None.
         engines: instead of ours and the peers; the first one is the one that goals are about.
     """
     several = (OURS, OURS_CHECKED, *PEERS) if engines is None else tuple(engines)
-    rounds = rounds or (11 if quick else 21)
+    rounds = rounds or (5 if quick else 9)
     report = Report("collision")
-    rows = easy(several, count=250 if quick else 1000, rounds=rounds)
+    rows = easy(several, count=100 if quick else 500, rounds=rounds)
     report.tables["queries of unrelated pairs"] = rows
     report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(
-        several, count=32 if quick else 96, rounds=1
+        several, count=32 if quick else 64, rounds=1
     )
     report.goals += _goals(rows, several)
     report.plots += [

@@ -38,11 +38,12 @@ WRONG = 1e-6
 TOO_FAR = 1e-9
 """Part of the distance by which an exact method may be too far before it is wrong."""
 
+LARGE = "torus, 100 000 triangles"
 MESHES: dict[str, Callable[[], Floats]] = {
     "box, 12 triangles": lambda: box_surface((0.6, 0.5, 0.4)),
     "sphere, 5 120 triangles": lambda: sphere(0.4, 1.7e-4).triangles,
     "phantom, 26 756 triangles": lambda: phantom(26_756),
-    "torus, 100 000 triangles": lambda: torus(100_000),
+    LARGE: lambda: torus(100_000),
 }
 
 
@@ -66,9 +67,8 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
         rows = on_mesh(name, triangles, queries=12 if quick else 60, counts=counts, rounds=rounds)
         report.tables[name] = rows
         report.plots.append(_plot(name, rows))
-    large = "torus, 100 000 triangles"
-    rows = report.tables.get(large, [])
-    report.goals.append(advantage("cone.speed", rows, [large], "embree, 1000 rays", EXACT))
+    rows = report.tables.get(LARGE, [])
+    report.goals.append(advantage("cone.speed", rows, [LARGE], "embree, 1000 rays", EXACT))
     errors = [row.worst_error for several in report.tables.values() for row in several if row.method == EXACT]
     worst = max(errors) if errors else math.nan
     report.goals.append(Goal("cone.error", worst))
@@ -151,7 +151,7 @@ def judge(found: Floats, truth: Floats, *, exact: bool) -> Check:
 
 def _plot(name: str, rows: Sequence[Row]) -> Plot:
     groups = {row.method: row.method.split(",")[0] + " rays" for row in rows if row.method.endswith("rays")}
-    return pareto_plot(name, rows, "worst relative error", groups)
+    return pareto_plot(name, rows, "worst relative error", groups, headline=name == LARGE)
 
 
 def read_once(method: str, question: dict[str, Any], *, engine: str = "own", count: int = 1000) -> float:

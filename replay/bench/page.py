@@ -6,6 +6,7 @@ import base64
 import html
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from replay.bench import goals
 from replay.bench.report import LEAST_ERROR, Plot, Report, cells_of, pareto_front
@@ -56,12 +57,20 @@ def _base64(plot: Plot) -> str:
     return base64.b64encode(png(plot)).decode("ascii")
 
 
-def png(plot: Plot) -> bytes:
-    """Return a plot as a PNG picture."""
+def png(*plots: Plot) -> bytes:
+    """Return plots side by side as a PNG picture."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.5, 5.0), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
+    figure = Figure(figsize=(7.5 * len(plots), 5.0), layout="constrained")
+    for number, plot in enumerate(plots, 1):
+        _draw(plot, figure.add_subplot(1, len(plots), number, xscale="log", yscale="log"))
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return buffer.getvalue()
+
+
+def _draw(plot: Plot, axes: Any) -> None:
+    axes.set(xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
     drawn = {
         name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points) for name, points in plot.lines.items()
     }
@@ -78,9 +87,6 @@ def png(plot: Plot) -> bytes:
     axes.grid(visible=True, which="major", alpha=0.3)
     if drawn:
         axes.legend(fontsize=8)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return buffer.getvalue()
 
 
 _PAGE = """<!doctype html>

@@ -39,6 +39,7 @@ class Plot:
         joined: whether the points of a name are joined by a line.
         front: whether the Pareto front is drawn: the points that no other beats in x and in y.
         crossed: points of methods that missed something, drawn with a cross; they are not on the front.
+        headline: whether it is among those that stand for the whole run.
     """
 
     title: str
@@ -48,6 +49,7 @@ class Plot:
     joined: bool = False
     front: bool = False
     crossed: list[tuple[float, float]] = field(default_factory=list)
+    headline: bool = False
 
 
 LEAST_ERROR = 1e-17
@@ -122,13 +124,16 @@ def _processor() -> str:
     return names[0] if names else platform.machine()
 
 
-def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None) -> Plot:
+def pareto_plot(
+    title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None, *, headline: bool = False
+) -> Plot:
     """Return error over time per query for the rows that did not fail, the Pareto front marked.
 
     Args:
         title, error: texts; `error` says what the error is measured in.
         rows: of one case.
         groups: name of the line a method belongs to; its own name where it is not listed.
+        headline: see `Plot`.
     """
     lines: dict[str, list[tuple[float, float]]] = {}
     crossed = []
@@ -138,7 +143,7 @@ def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, s
             lines.setdefault(name, []).append((row.median, row.worst_error))
             if row.missed:
                 crossed.append((row.median, row.worst_error))
-    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed)
+    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed, headline=headline)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

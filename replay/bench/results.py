@@ -1,4 +1,4 @@
-"""What a run of benchmarks leaves: bench.json, bench.html, and text for the terminal that ends with the goals."""
+"""What a run of benchmarks leaves: bench.json, bench.html, bench.png, and text that ends with the goals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.bench import goals
-from replay.bench.page import page
+from replay.bench.page import page, png
 from replay.bench.report import Report, align, machine
 from replay.logs.part_file import write_file
 
@@ -48,16 +48,20 @@ def facts(reports: Sequence[Report]) -> dict[str, str]:
     return found
 
 
-def write(reports: Sequence[Report], directory: Path) -> tuple[Path, Path]:
-    """Write bench.json and bench.html into a directory and return their paths.
+def write(reports: Sequence[Report], directory: Path) -> list[Path]:
+    """Write bench.json, bench.html and, of plots that stand for the run, bench.png; return their paths.
 
     Raises:
         WriteError: it cannot be written.
     """
-    data, shown = directory / "bench.json", directory / "bench.html"
-    write_file(data, json.dumps(as_json(reports), indent=1) + "\n")
-    write_file(shown, page(reports, facts(reports)))
-    return data, shown
+    files = {
+        "bench.json": (json.dumps(as_json(reports), indent=1) + "\n").encode(),
+        "bench.html": page(reports, facts(reports)).encode(),
+    }
+    headlines = [plot for report in reports for plot in report.plots if plot.headline]
+    if headlines:
+        files["bench.png"] = png(*headlines)
+    return [write_file(directory / name, content) for name, content in files.items()]
 
 
 def _goals(reports: Sequence[Report]) -> list[goals.Goal]:

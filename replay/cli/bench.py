@@ -26,7 +26,7 @@ BENCHMARKS = (
     type=click.Path(path_type=Path),
     default=Path("recordings/bench"),
     show_default=True,
-    help="Folder for bench.json and bench.html.",
+    help="Folder for bench.json, bench.html and bench.png.",
 )
 @format_option
 def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitCode:

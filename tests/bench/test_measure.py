@@ -90,11 +90,11 @@ def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
         goals=[Goal("cone.speed", math.nan), Goal("gjk.fcl", 4.0)],
         plots=[
             Plot("cost", "n", "s", {"ours": [(1.0, 0.0), (10.0, 1e-3)]}, joined=True, front=True, crossed=[(1.0, 0.0)]),
-            pareto_plot("empty", [], "error"),
+            pareto_plot("empty", [], "error", headline=True),
         ],
         notes=["a note"],
     )
-    data, page = results.write([report, Report("second")], tmp_path / "new")
+    data, page, picture = results.write([report, Report("second")], tmp_path / "new")
     found = json.loads(data.read_text())
     assert set(found) == {"machine", "goals", "benchmarks"}
     assert set(found["benchmarks"]) == {"test", "second"}
@@ -108,6 +108,7 @@ def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
     ]
     assert found["goals"][1]["measured"] is None
     assert "numpy" in found["machine"]["packages"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
     html = page.read_text()
     assert "table &lt;1&gt;" in html
     assert html.index("not measured") < html.index("table &lt;1&gt;")  # the goals come first
