@@ -64,7 +64,11 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
         RecordingError: a recording cannot be read.
         InvalidValue: see `find_scenarios`.
     """
-    scenarios: list[Scenario] = []
+    return [scenario for scenario, _ in _load(paths)]
+
+
+def _load(paths: Sequence[str | Path]) -> list[tuple[Scenario, Path]]:
+    scenarios: list[tuple[Scenario, Path]] = []
     problems: list[Problem] = []
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
@@ -75,9 +79,10 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
             continue
         for scenario in found:
             if scenario.name in homes:
-                problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
+                rule = f"name {scenario.name!r} is taken by {homes[scenario.name]}; each scenario of a run has its own"
+                problems.append(Problem(rule, file=str(path)))
             homes[scenario.name] = path
-            scenarios.append(scenario)
+            scenarios.append((scenario, path))
     if problems:
         raise ScenarioError(problems)
     return scenarios
@@ -97,21 +102,24 @@ class Selection:
     Attributes:
         chosen: the scenarios to run.
         skipped: those that were filtered out, by name, with the reason.
+        sources: the file that each comes from, as the user named it.
     """
 
     chosen: tuple[Scenario, ...]
     skipped: Mapping[str, str]
+    sources: Mapping[str, Path]
 
     @staticmethod
     def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
         """Return what paths, patterns and a shard select; errors as of `load_all`."""
-        everything = load_all(paths)
+        loaded = _load(paths)
+        everything = [scenario for scenario, _ in loaded]
         matching = select(everything, patterns)
         chosen = shard.of(matching) if shard else matching
         names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
         skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
         skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
-        return Selection(tuple(chosen), skipped)
+        return Selection(tuple(chosen), skipped, {scenario.name: path for scenario, path in loaded})
 
 
 def _matches(scenario: Scenario, pattern: str) -> bool:

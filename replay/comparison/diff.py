@@ -32,6 +32,7 @@ def compare(
     strict_provenance: bool = False,
     scene: Iterable[Change] = (),
     added: Iterable[Change] = (),
+    equal: int = 0,
 ) -> Difference:
     """Return how a candidate differs from a baseline.
 
@@ -41,6 +42,7 @@ def compare(
         strict_provenance: other versions, models and inputs make the verdict "different".
         scene: changes of the scene or the schemas, which recordings do not hold in columns.
         added: what only the candidate's schemas have; told with the provenance.
+        equal: number of signals that are known to be equal and are in neither recording.
     """
     rules = rules or Rules()
     frames, matched = match_frames(baseline.time, candidate.time, rules)
@@ -74,7 +76,7 @@ def compare(
         missing=missing,
         extra=extra,
         signals=tuple(sorted(signals, key=lambda signal: (not signal.decides, signal.signal))),
-        compared=total - sum(len(absence.signals) for absence in missing),
+        compared=equal + total - sum(len(absence.signals) for absence in missing),
         strict_provenance=strict_provenance,
     )
     return dataclasses.replace(found, expired=expired_rules(found, rules))

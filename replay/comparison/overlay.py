@@ -22,7 +22,7 @@ from replay.comparison.plots import Curve, Curves
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, Pair, RunDifference
 from replay.recording.blueprint import TIMELINE
-from replay.recording.reader import Recording
+from replay.recording.reader import Recording, read
 from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_log import APPLICATION
 
@@ -73,7 +73,8 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for side, recording in ((BASELINE, pair.baseline), (CANDIDATE, pair.candidate)):
             _log_scene(stream, side, recording)
-            _log_poses(stream, side, recording)
+            # a pair lacks the topics that are equal in both
+            _log_poses(stream, side, recording if recording.layout.links else read(recording.path, topics=["/tf"]))
         curves = Curves(pair)
         for item in shown:
             _log_curve(stream, item, curves.curve(item), pair.baseline)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from pathlib import Path
 from typing import BinaryIO
 
-from replay.errors import RecordingExistsError, WriteError
+from replay.errors import NoSpaceError, RecordingExistsError, WriteError
+
+_NO_SPACE = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT") if hasattr(errno, name)}  # the second: a quota's
 
 UNFINISHED = ".part"
 """What the name of a file ends in while it is written."""
@@ -98,13 +101,14 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path
 
 
 def write_error(path: Path, error: OSError | UnicodeEncodeError) -> WriteError:
-    """Return the WriteError that says why the system refused `path`."""
+    """Return the WriteError that says why the system refused `path`: a NoSpaceError when the disk is full."""
     if isinstance(error, UnicodeEncodeError):
         return WriteError(str(path), f"names of files are {error.encoding} here; LC_ALL=C.UTF-8 allows any")
     in_the_way = next((folder for folder in path.parents if folder.exists() and not folder.is_dir()), None)
     if in_the_way is not None:
         return WriteError(str(path), f"{in_the_way} is a file where a folder is needed")
-    return WriteError(str(path), error.strerror or str(error))
+    kind = NoSpaceError if error.errno in _NO_SPACE else WriteError
+    return kind(str(path), error.strerror or str(error))
 
 
 def _sync_folder(folder: Path) -> None:

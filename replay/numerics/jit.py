@@ -24,12 +24,16 @@ import llvmlite.binding
 import numba
 from numba.core import config
 
+from replay.numerics import announcement
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 KERNEL_ROOMS = ("numerics", "geometry", "kinematics", "collision", "sensing")
 """The rooms of the package in which kernels live."""
 
 _KEPT_CACHES = 4  # a developer switches between a few branches; older folders are removed
+
+announcement.install()
 
 
 def source_hash(package: Path | None = None) -> str:
@@ -86,11 +90,6 @@ def _prune(base: Path, *, keep: Path) -> None:
         shutil.rmtree(entry, ignore_errors=True)
 
 
-def is_cache_empty() -> bool:
-    """Return whether no kernel of this version has been compiled on this machine yet."""
-    return next(cache_directory().rglob("*.nbi"), None) is None
-
-
 def kernel(function: Function) -> Function:
     """Compile a function under the package's one jit policy.
 
@@ -119,6 +118,15 @@ def leaf_kernel(function: Function) -> Function:
     options = getattr(dispatcher, "targetoptions", None)  # None when NUMBA_DISABLE_JIT leaves the function as it is
     if isinstance(options, dict) and _counting_is_optional():
         options["_nrt"] = False
+    return dispatcher
+
+
+def inlined_kernel(function: Function) -> Function:
+    """Compile as `leaf_kernel` does, into the body of every caller."""
+    dispatcher = leaf_kernel(function)
+    options = getattr(dispatcher, "targetoptions", None)
+    if isinstance(options, dict):
+        options["forceinline"] = True
     return dispatcher
 
 

@@ -134,6 +134,7 @@ class _Assembly:
         if log.loss is not None and not log.preamble_checked:
             raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
         names = {channel.topic for channel in log.channels.values()}
+        self._check_topics(names)
         chosen = names
         if wanted is not None:
             for name in wanted:
@@ -176,6 +177,16 @@ class _Assembly:
             loss=self._log.loss,
             lost_frames=self._provenance.frames - count,
         )
+
+    def _check_topics(self, names: set[str]) -> None:
+        """Refuse a file without the topics that every recording has, or with some sensors of a kind and not all."""
+        needed = {FRAMES, "/tf", EVENTS}
+        for group in ("distance", "capacitive"):
+            sensors = {f"/{group}/{name}" for name in getattr(self._provenance.layout, f"{group}_sensors")}
+            needed |= sensors if sensors & names else set()
+        missing = ", ".join(map(repr, sorted(needed - names)))
+        if missing:
+            raise RecordingError(self._file, f"damaged: topics are missing: {missing}")
 
     def _whole_frames(self) -> NDArray[np.int64]:
         """Return the times of the frames of whole blocks: those that every topic of the recording has."""
@@ -225,8 +236,7 @@ class _Assembly:
         return CollisionColumns(**{f: self._column(topic, f, len(self._layout.pairs)) for f in COLLISION_FIELDS})
 
     def _distance(self) -> DistanceColumns | None:
-        topics = [self._topics.get(f"/distance/{name}") for name in self._layout.distance_sensors]
-        present = [topic for topic in topics if topic is not None]
+        present = self._sensors("/distance", self._layout.distance_sensors)
         if not present:
             return None
         columns: dict[str, Any] = {
@@ -236,12 +246,10 @@ class _Assembly:
         for field in DISTANCE_VECTORS:
             vectors = [[self._column(topic, f"{field}.{letter}") for letter in "xyz"] for topic in present]
             columns[field] = np.stack([np.stack(parts, axis=1) for parts in vectors], axis=1)
-        self._all_present(len(present), "distance_sensors")
         return DistanceColumns(**columns)
 
     def _capacitive(self) -> CapacitiveColumns | None:
-        topics = [self._topics.get(f"/capacitive/{name}") for name in self._layout.capacitive_sensors]
-        present = [topic for topic in topics if topic is not None]
+        present = self._sensors("/capacitive", self._layout.capacitive_sensors)
         if not present:
             return None
         columns = {
@@ -251,12 +259,12 @@ class _Assembly:
             )
             for field in CAPACITIVE_FIELDS
         }
-        self._all_present(len(present), "capacitive_sensors")
         return CapacitiveColumns(**columns)
 
-    def _all_present(self, count: int, group: str) -> None:
-        if count != len(getattr(self._layout, group)):
-            raise RecordingError(self._file, f"damaged: its metadata name more {group} than it has topics")
+    def _sensors(self, group: str, sensors: tuple[str, ...]) -> list[Topic]:
+        """Return the topics of a group's sensors, empty when the recording has none of them."""
+        names = [f"{group}/{sensor}" for sensor in sensors]
+        return [self._topics[name] for name in names if name in self._topics]
 
     def _events(self) -> Events:
         if not self._with_events:
