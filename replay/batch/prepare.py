@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from replay.scenario.methods import Model
+from replay.scenario.methods import CapacitiveMethod, DistanceMethod, Model
 from replay.scenario.model import Scenario
 
 _SCENE = b"""
@@ -54,7 +54,7 @@ f 1 2 8\nf 1 8 7\nf 2 3 9\nf 2 9 8\nf 3 4 10\nf 3 10 9\nf 4 5 11\nf 4 11 10\nf 5
 
 @dataclass(frozen=True)
 class Needs:
-    """What scenarios compute, and by which methods; limits that do not change what is compiled are left out."""
+    """What scenarios compute, and by which methods; numbers that do not change what is compiled are left out."""
 
     model: Model
     collision: bool
@@ -67,7 +67,7 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
     """Return what scenarios need, each combination once."""
     needs = (
         Needs(
-            model or scenario.model,
+            _methods(model or scenario.model),
             collision=scenario.collision.pairs == "all",
             distance=bool(scenario.sensors.distance),
             capacitive=bool(scenario.sensors.capacitive),
@@ -78,6 +78,13 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
     return tuple(dict.fromkeys(needs))
 
 
+def _methods(model: Model) -> Model:
+    distance = DistanceMethod(method=model.distance.method, engine=model.distance.engine)
+    return Model(
+        collision=model.collision, distance=distance, capacitive=CapacitiveMethod(method=model.capacitive.method)
+    )
+
+
 @dataclass(frozen=True)
 class PrepareKernels:
     """What a worker calls before its first scenario: compiles kernels, or loads those that are compiled already.
@@ -85,10 +92,12 @@ class PrepareKernels:
     Attributes:
         needs: what its scenarios compute.
         rrd: they make rerun recordings too, so that library is loaded as well.
+        savings: see `simulation.simulate`.
     """
 
     needs: tuple[Needs, ...]
     rrd: bool = False
+    savings: bool = True
 
     def __call__(self, tell: Callable[[str], None]) -> None:
         """Run the small scene with each combination of methods."""
@@ -103,7 +112,7 @@ class PrepareKernels:
             text = text.replace(b"{SENSORS}", f"{{{', '.join(sensors)}}}".encode())
             text = text.replace(b"{SHAPES}", f"{{{_MESH if needs.meshes else ''}}}".encode())
             scenario = load_sources("prepare.yaml", {"prepare.yaml": text, "corner.obj": _CORNER})
-            for _ in simulate(scenario, model=needs.model):
+            for _ in simulate(scenario, model=needs.model, savings=self.savings):
                 pass
         if self.rrd:
             importlib.import_module("rerun")

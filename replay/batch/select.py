@@ -16,6 +16,8 @@ from replay.scenario.model import Scenario
 RULES = "rules.yaml"
 """Name of the file of tolerances that comes with a folder of scenarios."""
 
+RECORDINGS = (".mcap", ".mcap.part")
+"""What names of recordings end in, finished and unfinished ones."""
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
 
 
@@ -27,10 +29,12 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     environment's, are not looked at.
 
     Raises:
-        InvalidValue: a path is not there, or a folder holds no scenario.
+        InvalidValue: a path is not there or is an `.rrd`, or a folder holds no scenario.
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):
+        if path.is_file() and path.suffix == ".rrd":
+            raise InvalidValue("SCENARIO", path, "holds drawings only; the .mcap beside it can be run again")
         if path.is_file():
             found[path] = None
         elif path.is_dir():
@@ -69,7 +73,7 @@ def _load(paths: Sequence[str | Path]) -> list[tuple[Scenario, Path]]:
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
         try:
-            found = [_attached(path)] if path.suffix == ".mcap" else load_cases(path)
+            found = [_attached(path)] if path.name.endswith(RECORDINGS) else load_cases(path)
         except ScenarioError as error:
             problems.extend(error.problems)
             continue
