@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import datetime
+import errno
 import json
 import os
 import platform
@@ -152,6 +153,8 @@ def run_all(
                 result = _finish(_result(ended), ended.task.payload.folder)
                 results[result.name] = result
                 watch.done(result)
+                if result.no_space:
+                    raise NoSpaceError(str(directory), os.strerror(errno.ENOSPC))
         interrupted = False
     except KeyboardInterrupt:
         for scenario in left:
