@@ -47,12 +47,14 @@ class CaseOrder:
         folder: for its recordings.
         model: replaces the scenario's own.
         rrd: whether to make a rerun recording too.
+        savings: see `simulation.simulate`.
     """
 
     scenario: Scenario
     folder: Path
     model: Model | None = None
     rrd: bool = True
+    savings: bool = True
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     begin = time.perf_counter()
     scenario = order.scenario
     try:
-        scene = build(scenario, model=order.model)
+        scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check = scene.expectation_check()
         covered = CoveredSensors(scene.layout)

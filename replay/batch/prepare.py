@@ -92,10 +92,12 @@ class PrepareKernels:
     Attributes:
         needs: what its scenarios compute.
         rrd: they make rerun recordings too, so that library is loaded as well.
+        savings: see `simulation.simulate`.
     """
 
     needs: tuple[Needs, ...]
     rrd: bool = False
+    savings: bool = True
 
     def __call__(self, tell: Callable[[str], None]) -> None:
         """Run the small scene with each combination of methods."""
@@ -110,7 +112,7 @@ class PrepareKernels:
             text = text.replace(b"{SENSORS}", f"{{{', '.join(sensors)}}}".encode())
             text = text.replace(b"{SHAPES}", f"{{{_MESH if needs.meshes else ''}}}".encode())
             scenario = load_sources("prepare.yaml", {"prepare.yaml": text, "corner.obj": _CORNER})
-            for _ in simulate(scenario, model=needs.model):
+            for _ in simulate(scenario, model=needs.model, savings=self.savings):
                 pass
         if self.rrd:
             importlib.import_module("rerun")

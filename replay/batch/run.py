@@ -82,6 +82,7 @@ def run_all(
     *,
     model: Model | None = None,
     rrd: bool = True,
+    savings: bool = True,
     overwrite: bool = False,
     resume: bool = False,
     execution: Execution | None = None,
@@ -98,6 +99,7 @@ def run_all(
         directory: the run folder; made when it is not there.
         model: replaces the scenarios' own models.
         rrd: whether to make rerun recordings too.
+        savings: see `simulation.simulate`.
         overwrite: replace recordings that exist; one whose scenario now fails is removed.
         resume: keep the results of an earlier run that are still valid, and replace the others.
         execution: where, and within which limits.
@@ -112,7 +114,7 @@ def run_all(
     started = datetime.datetime.now(datetime.UTC)
     results: dict[str, CaseResult] = {}
     if resume:
-        results = _reused(scenarios, directory, model=model, rrd=rrd, watch=watch)
+        results = _reused(scenarios, directory, model=model, rrd=rrd, savings=savings, watch=watch)
     elif not overwrite:
         for scenario in scenarios:
             for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
@@ -143,7 +145,7 @@ def run_all(
                 results[scenario.name] = _unwritable(scenario.name, error)
                 watch.done(results[scenario.name])
                 continue
-            order = CaseOrder(scenario, log.parent, model, rrd)
+            order = CaseOrder(scenario, log.parent, model, rrd, savings)
             tasks.append(Task(scenario.name, order, costs[scenario.name], log))
         with contextlib.closing(_endings(tasks, workers, execution, watch)) as endings:
             for ended in endings:
@@ -164,7 +166,11 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
     limits: dict[str, Any] = {
         "timeout": execution.timeout,
         "memory": execution.memory,
-        "prepare": PrepareKernels(tuple(needs), rrd=any(order.rrd for order in orders)),
+        "prepare": PrepareKernels(
+            tuple(needs),
+            rrd=any(order.rrd for order in orders),
+            savings=all(order.savings for order in orders),
+        ),
         "follow": watch.follow,
         "check": watch.check,
     }
@@ -177,11 +183,11 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
 
 
 def _reused(
-    scenarios: Sequence[Scenario], directory: Path, *, model: Model | None, rrd: bool, watch: Watch
+    scenarios: Sequence[Scenario], directory: Path, *, model: Model | None, rrd: bool, savings: bool, watch: Watch
 ) -> dict[str, CaseResult]:
     results = {}
     for scenario in scenarios:
-        found = earlier_result(scenario, directory / scenario.name, model=model, rrd=rrd)
+        found = earlier_result(scenario, directory / scenario.name, model=model, rrd=rrd, savings=savings)
         if isinstance(found, CaseResult):
             results[scenario.name] = found
             watch.tell(f"{scenario.name}: reused")

@@ -62,6 +62,7 @@ class Scene:
     Attributes:
         scenario: where it comes from.
         model: the version of each method: the scenario's own, or the one that replaces it.
+        savings: whether work is left out that the scene does not need, see `simulation.simulate`.
         linkage, script: links, joints, and how they move.
         shapes: all shapes, sorted by name.
         bodies, pairs: what is tested for collision; no bodies when no pair is.
@@ -73,6 +74,7 @@ class Scene:
 
     scenario: Scenario
     model: Model
+    savings: bool
     linkage: Linkage
     script: Script
     shapes: tuple[SceneShape, ...]
@@ -124,12 +126,13 @@ class Scene:
         )
 
 
-def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Scene:
+def build(scenario: Scenario, *, model: Model | str | Path | None = None, savings: bool = True) -> Scene:
     """Return the scene of a scenario.
 
     Args:
         scenario: as loaded.
         model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
+        savings: see `Scene`.
 
     Raises:
         ScenarioError: a mesh cannot be used, a shape needs too many triangles, an expectation is about a pair that is
@@ -159,6 +162,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
     return Scene(
         scenario=scenario,
         model=model,
+        savings=savings,
         linkage=machine,
         script=script(scenario),
         shapes=scene_shapes,
