@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from replay.errors import ReplayError
+from replay.errors import ReplayError, ScenarioError
 from replay.recording.record import Progress, RecordedPaths
+from replay.scenario.covered import CoveredSensors
 from replay.scenario.verdict import ExpectationCheck, Outcome
 
 if TYPE_CHECKING:
@@ -46,12 +47,14 @@ class CaseOrder:
         folder: for its recordings.
         model: replaces the scenario's own.
         rrd: whether to make a rerun recording too.
+        savings: see `simulation.simulate`.
     """
 
     scenario: Scenario
     folder: Path
     model: Model | None = None
     rrd: bool = True
+    savings: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class CaseResult:
         outcomes: what became of each expectation.
         recordings: where they are; None when there are none.
         error: the one line that says why there are none; "" when there are.
+        invalid: the scenario itself is at fault: a mesh cannot be used, or no scene can be built of it.
         counters: what the collision pipeline did, by counter.
         seconds: wall time.
         memory: the most resident memory seen [bytes].
@@ -78,6 +82,7 @@ class CaseResult:
     outcomes: tuple[Outcome, ...] = ()
     recordings: RecordedPaths | None = None
     error: str = ""
+    invalid: bool = False
     counters: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     memory: int = 0
@@ -124,14 +129,16 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     begin = time.perf_counter()
     scenario = order.scenario
     try:
-        scene = build(scenario, model=order.model)
+        scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check = scene.expectation_check()
-        blocks = _checked(simulation.blocks(), check)
+        covered = CoveredSensors(scene.layout)
+        blocks = _checked(simulation.blocks(), check, covered)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
-        return CaseResult(scenario.name, Status.FAILED, error=str(error), seconds=seconds)
+        invalid = isinstance(error, ScenarioError)
+        return CaseResult(scenario.name, Status.FAILED, error=str(error), invalid=invalid, seconds=seconds)
     outcomes = tuple(check.finish())
     return CaseResult(
         scenario.name,
@@ -141,7 +148,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=scene.notes,
+        notes=(*scene.notes, *covered.notes()),
     )
 
 
@@ -158,7 +165,8 @@ def describe(result: CaseResult) -> list[str]:
     return lines
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
+def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, covered: CoveredSensors) -> Iterator[FrameBlock]:
     for block in blocks:
+        covered.update(block.distance)
         check.update(block.time, block.collision, block.distance, block.capacitive)
         yield block

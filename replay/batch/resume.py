@@ -18,7 +18,9 @@ from replay.scenario.model import Scenario
 RESULT = "result.json"
 
 
-def earlier_result(scenario: Scenario, folder: Path, *, model: Model | None, rrd: bool) -> CaseResult | str:
+def earlier_result(
+    scenario: Scenario, folder: Path, *, model: Model | None, rrd: bool, savings: bool = True
+) -> CaseResult | str:
     """Return the result in a scenario's folder, or why it cannot be used again.
 
     The recording's checksums are verified, and what it says of itself is compared with what a run would say now: the
@@ -29,6 +31,7 @@ def earlier_result(scenario: Scenario, folder: Path, *, model: Model | None, rrd
         folder: where an earlier run may have left its recordings.
         model: replaces the scenario's own.
         rrd: whether a rerun recording is wanted too.
+        savings: whether it is wanted with savings.
     """
     paths = RecordedPaths(folder / f"{scenario.name}.mcap", folder / f"{scenario.name}.rrd" if rrd else None)
     for path in (paths.mcap, paths.rrd, folder / RESULT):
@@ -47,7 +50,7 @@ def earlier_result(scenario: Scenario, folder: Path, *, model: Model | None, rrd
     now = {"scenario": scenario.name, "root": scenario.main_source, "code": code_identity()}
     changed = [what for what, value in now.items() if getattr(found, what) != value]
     changed += _changes("file ", found.files, scenario.sha256)
-    changed += _changes("model ", found.model, (model or scenario.model).identity())
+    changed += _changes("model ", found.model, (model or scenario.model).identity(savings=savings))
     changed += _changes("version of ", found.libraries, library_versions())
     return f"changed: {', '.join(changed)}" if changed else result
 

@@ -28,9 +28,8 @@ FRAMES = 64
 """Frames in which the cost against the number of bodies is measured."""
 
 
-def add_to(report: Report, *, frames: int, most: int, rounds: int) -> None:
-    """Add tightness per volume on the motion, and cost against the number of bodies up to `most`."""
-    report.grids["bounding volumes on the motion"] = tightness(frames, rounds)
+def growth(report: Report, *, most: int, rounds: int) -> None:
+    """Add the cost of a frame against the number of bodies up to `most`."""
     sizes = [n for n in (10, 30, 100, 300, 1000, 3000, 10_000) if n <= most]
     rows = []
     for n in sizes:
@@ -43,11 +42,13 @@ def add_to(report: Report, *, frames: int, most: int, rounds: int) -> None:
         name: [(float(n), row.median) for n, row in zip(sizes, (r for r in rows if r.method == name), strict=True)]
         for name in ("replay, obb", "replay, sphere")
     }
-    report.plots.append(Plot("cost of a frame", "bodies", "s per frame", lines, joined=True))
+    named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}
+    report.plots.append(Plot("a frame against its bodies", "bodies", "s per frame", named, joined=True))
+    half = min(len(sizes) // 2, len(sizes) - 2)
     for name, points in lines.items():
-        power = exponent(points)
         report.notes.append(
-            f"{name}: the cost of a frame grows like n^{power:.2f} from {sizes[0]} to {sizes[-1]} bodies."
+            f"{name}: the cost of a frame grows like n^{exponent(points):.2f} from {sizes[0]} to {sizes[-1]} bodies, "
+            f"from {sizes[half]} on like n^{exponent(points[half:]):.2f}."
         )
 
 

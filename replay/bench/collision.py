@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from replay.bench import broad_phase, motion
 from replay.bench.engines import OURS, OURS_CHECKED, PEERS, Body, Engine
+from replay.bench.goals import Goal, advantage
 from replay.bench.hard_pairs import HardPair, by_family, hard_pairs
 from replay.bench.inputs import box, ellipsoid, rotations
-from replay.bench.measure import Check, Contender, Goal, Row, absent, compete, ratio
+from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Report, pareto_plot
 from replay.bench.truth import proven_distance
 from replay.collision.gjk import distance
@@ -36,16 +37,16 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
 
     Args:
         quick: fewer queries and frames; about a minute.
-        rounds: times that every contender is timed; 21, or 11 when quick, if None.
+        rounds: times that every contender is timed; 9, or 5 when quick, if None.
         engines: instead of ours and the peers; the first one is the one that goals are about.
     """
     several = (OURS, OURS_CHECKED, *PEERS) if engines is None else tuple(engines)
-    rounds = rounds or (11 if quick else 21)
+    rounds = rounds or (5 if quick else 9)
     report = Report("collision")
-    rows = easy(several, count=250 if quick else 1000, rounds=rounds)
+    rows = easy(several, count=100 if quick else 500, rounds=rounds)
     report.tables["queries of unrelated pairs"] = rows
     report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(
-        several, count=32 if quick else 96, rounds=1
+        several, count=32 if quick else 64, rounds=1
     )
     report.goals += _goals(rows, several)
     report.plots += [
@@ -54,7 +55,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
         for call in ("distance",)
     ]
     motion.add_to(report, frames=512 if quick else 2000, rounds=min(rounds, 5))
-    broad_phase.add_to(report, frames=512 if quick else 2000, most=1000 if quick else 10_000, rounds=min(rounds, 3))
+    report.grids["bounding volumes on the motion"] = broad_phase.tightness(512 if quick else 2000, min(rounds, 3))
     return report
 
 
@@ -183,12 +184,8 @@ def judge(call: str, pairs: Sequence[HardPair]) -> Callable[[Floats], Check]:
 def _goals(rows: Sequence[Row], engines: Sequence[Engine]) -> list[Goal]:
     """Return the goals: the least advantage over a peer that takes part, over all bodies and places."""
     ours = engines[0].name
-    goals = []
-    for peer in ("python-fcl", "coal"):
-        ratios = [ratio(rows, f"{body}, {place}, boolean", peer, ours) for body in BODIES for place in PLACES]
-        known = [value for value in ratios if not np.isnan(value)]
-        least = min(known) if len(known) == len(ratios) else float("nan")
-        goals.append(Goal(f"GJK boolean, least over 8..642 vertices, against {peer}", ">= 3x", least, 3.0))
+    cases = [f"{body}, {place}, boolean" for body in BODIES for place in PLACES]
+    goals = [advantage(key, rows, cases, peer, ours) for key, peer in (("gjk.fcl", "python-fcl"), ("gjk.coal", "coal"))]
     wrong = sum(row.wrong for row in rows if row.method == ours)
-    goals.append(Goal("wrong answers of ours, unrelated pairs", "0", float(wrong), 0.0, "", at_least=False))
+    goals.append(Goal("gjk.wrong", float(wrong)))
     return goals

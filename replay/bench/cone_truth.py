@@ -7,7 +7,9 @@ nearest point, if that is in the cone, or else lies on the cone's border. The bo
 
 and the ray w(f) meets the triangle a b c at t(f) = delta / (n.w(f)) where it passes between the planes of the apex and
 each edge. The angles at which it does are found by sampling and bisection, the smallest t among them by golden section.
-All in extended precision where the platform has it.
+All in extended precision where the platform has it. The plane of a triangle thinner than THIN is lost even there; it
+is as near as its edges to about THIN squared, and on an edge both the membership (concave) and the distance (convex)
+are searched from end to end.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Wide = NDArray[np.longdouble]
 
+THIN = 1e-6
+"""Width over length below which a triangle is its edges."""
 SAMPLES = 256
 """Angles at which every border is looked at, besides those near which an edge is crossed."""
 
@@ -47,7 +51,44 @@ def nearest_in_cone(triangles: Floats, apex: Floats, axis: Floats, aperture: flo
     for k in candidates[np.argsort(lengths[candidates])].tolist():
         if float(lengths[k]) >= best:
             break
-        best = min(best, _on_border(corners[k], v, h))
+        best = min(best, _on_edges(corners[k], v, h) if _is_thin(corners[k]) else _on_border(corners[k], v, h))
+    return best
+
+
+def _is_thin(corners: Wide) -> bool:
+    a, b, c = corners
+    longest = max(float(np.sum(edge * edge)) for edge in (b - a, c - b, a - c))
+    return float(np.sqrt(np.sum(np.cross(b - a, c - a) ** 2))) < THIN * longest
+
+
+def _on_edges(corners: Wide, v: Wide, h: np.longdouble) -> float:
+    """Return the distance of the nearest point of a triangle's edges in the cone; inf if there is none."""
+    best = math.inf
+    for k in range(3):
+        start, way = corners[k], corners[(k + 1) % 3] - corners[k]
+
+        def inside(t: np.longdouble, start: Wide = start, way: Wide = way) -> np.longdouble:
+            return np.longdouble(_membership((start + t * way)[None], v, h)[0])
+
+        ends = np.longdouble(0), np.longdouble(1)
+        low, high = ends
+        for _ in range(100):
+            first, second = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+            low, high = (first, high) if inside(first) < inside(second) else (low, second)
+        middle = max((low, high, *ends), key=inside)
+        if inside(middle) < 0:
+            continue
+        hits = []
+        for end in ends:
+            hit, miss = middle, end
+            for _ in range(0 if inside(end) >= 0 else 80):
+                half = (hit + miss) / 2
+                hit, miss = (half, miss) if inside(half) >= 0 else (hit, half)
+            hits.append(end if inside(end) >= 0 else hit)
+        square = way @ way
+        foot = -(start @ way) / square if square > 0 else np.longdouble(0)
+        t = min(max(foot, hits[0]), hits[1])
+        best = min(best, float(np.sqrt(np.sum((start + t * way) ** 2))))
     return best
 
 

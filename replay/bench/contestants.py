@@ -53,13 +53,14 @@ def _plate(method: str, question: dict[str, Any]) -> list[float]:
 def _plate_tree(question: dict[str, Any]) -> list[float]:
     from replay.geometry.tree import triangle_tree
     from replay.sensing.capacitive.clusters import make_clusters
-    from replay.sensing.capacitive.tree_sum import sum_tree
+    from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 
     triangles = np.array([question["triangle"]])
     tree = triangle_tree(triangles)
     half, both = np.array([question["half_size"]]), question["side"] == "both"
     here = np.identity(4)[None, None]
-    return [float(sum_tree(make_clusters(triangles, tree), tree, here, half, both, False, 1e-6)[0][0, 0])]
+    clusters, counts = make_clusters(triangles, tree), np.zeros(COUNTS, dtype=np.int64)
+    return [float(sum_tree(clusters, tree, here, half, both, False, 1e-6, counts)[0][0, 0])]
 
 
 def _obb(method: Literal["triangles", "vertices"], question: dict[str, Any]) -> list[float]:

@@ -129,24 +129,26 @@ def fcl_geometry(fcl: Any, body: Body) -> Any:
     return fcl.Convex(vertices, len(faces), np.insert(faces, 0, 3, axis=1).ravel())
 
 
+def coal_geometry(coal: Any, body: Body) -> Any:
+    """Return a body as coal's box or convex polytope."""
+    if body.size is not None:
+        return coal.Box(*body.size)
+    vertices, faces = _polytope(body.vertices)
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for vertex in vertices:
+        points.append(vertex)
+    for i, j, k in faces.tolist():
+        triangles.append(coal.Triangle(i, j, k))
+    return coal.Convex(points, triangles)
+
+
 def _coal(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
     import coal
-
-    def geometry(body: Body) -> Any:
-        if body.size is not None:
-            return coal.Box(*body.size)
-        vertices, faces = _polytope(body.vertices)
-        points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-        for vertex in vertices:
-            points.append(vertex)
-        for i, j, k in faces.tolist():
-            triangles.append(coal.Triangle(i, j, k))
-        return coal.Convex(points, triangles)
 
     def place(T: Floats) -> list[Any]:
         return [coal.Transform3s(pose[:3, :3].copy(), pose[:3, 3].copy()) for pose in T]
 
-    first, second = geometry(a), geometry(b)
+    first, second = coal_geometry(coal, a), coal_geometry(coal, b)
     collide, measure = coal.ComputeCollision(first, second), coal.ComputeDistance(first, second)
     question, contacts = coal.CollisionRequest(), coal.CollisionResult()
     question.enable_contact = False  # a boolean is asked for, no depth

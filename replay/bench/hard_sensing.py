@@ -18,22 +18,30 @@ Floats = NDArray[np.float64]
 Cones = tuple[Floats, Floats, Floats]
 """Triangles (n, 3, 3), axes (n, 3), apertures (n,); the apex is the origin."""
 
+SCALES = np.arange(-30, 21)
+"""Powers of two from 1e-9 to 1e6: what is scaled by them keeps every digit, and so does the answer."""
+
 
 def hard_cones(count: int, *, seed: int = 7) -> list[dict[str, Any]]:
     """Return questions about one triangle in a cone: family, triangles, apex, axis, aperture, truth (inf: nothing)."""
     questions = []
     for number, (family, make) in enumerate(_CONES.items()):
-        triangles, axes, apertures = make(np.random.default_rng([seed, number]), count)
-        for triangle, axis, aperture in zip(triangles, axes, apertures, strict=True):
+        rng = np.random.default_rng([seed, number])
+        triangles, axes, apertures = make(rng, count)
+        for k, (triangle, axis, aperture) in enumerate(zip(triangles, axes, apertures, strict=True)):
+            apex, size = np.zeros(3), float(np.abs(triangle).max())
+            if family == OFFSET:  # of what it rounds to, the difference from the apex is known without any error
+                apex = 10.0 ** (k % 9) * rng.normal(size=3)
+                triangle = triangle + apex
             questions.append(
                 {
                     "family": family,
                     "triangles": triangle[None],
-                    "apex": np.zeros(3),
+                    "apex": apex,
                     "axis": axis,
                     "aperture": float(aperture),
-                    "truth": nearest_in_cone(triangle[None], np.zeros(3), axis, float(aperture)),
-                    "size": float(np.abs(triangle).max()),
+                    "truth": nearest_in_cone(triangle[None], apex, axis, float(aperture)),
+                    "size": size,
                 }
             )
     return questions
@@ -105,6 +113,32 @@ def _scaled(rng: np.random.Generator, n: int) -> Cones:
     return triangles * 10.0 ** rng.uniform(-9.0, 6.0, size=(n, 1, 1)), axes, apertures
 
 
+def _slivers(rng: np.random.Generator, n: int) -> Cones:
+    """Triangles as thin as 1e-12 of their length, that the axis passes near."""
+    triangles, _, apertures = _generic(rng, n)
+    inner = triangles[:, 0] + rng.uniform(size=(n, 1)) * (triangles[:, 1] - triangles[:, 0])
+    triangles[:, 2] = inner + 10.0 ** rng.uniform(-12.0, -3.0, size=(n, 1)) * (triangles[:, 2] - inner)
+    return triangles, _towards(_inner(rng, triangles) + 0.2 * rng.normal(size=(n, 3))), apertures
+
+
+def _region_borders(rng: np.random.Generator, n: int) -> Cones:
+    """The foot of the apex on an edge or on a corner, an edge along the axis, the cone's border through the foot."""
+    triangles, axes, apertures = _generic(rng, n)
+    for k, T in enumerate(rotations(rng, n)[:, :3, :3]):
+        x, y, height = rng.uniform(0.2, 3.0, size=3)
+        corners = np.array([[-x, 0.0, height], [y, 0.0, height], [rng.normal(), 2.0, height]])  # the foot on an edge
+        if k % 4 == 1:
+            corners[:2, 0] += [x, x]  # on a corner
+        elif k % 4 == 2:
+            corners[0], corners[1] = [0.0, 0.0, height], [0.0, 0.0, 3.0 * height]  # an edge along the axis
+        axis = np.array([0.0, 0.0, 1.0])
+        if k % 4 == 3:  # the foot, on an edge, is on the border too, and what is behind it is inside
+            axis = np.array([0.0, np.sin(0.5 * apertures[k]), np.cos(0.5 * apertures[k])])
+        triangles[k], axes[k] = corners @ T.T, T @ axis
+    return triangles, axes, apertures
+
+
+OFFSET = "offset to 1e8 m"
 _CONES: dict[str, Callable[[np.random.Generator, int], Cones]] = {
     "any": _generic,
     "plane along the axis": _plane_along_axis,
@@ -113,7 +147,10 @@ _CONES: dict[str, Callable[[np.random.Generator, int], Cones]] = {
     "nearly a half space": _nearly_half_space,
     "apex 1e-9..1e-3 off surface": _apex_near_surface,
     "small, at the cone's border": _far_and_small,
+    "slivers": _slivers,
+    "region borders": _region_borders,
     "scale 1e-9..1e6": _scaled,
+    OFFSET: _generic,
 }
 
 
@@ -124,7 +161,13 @@ def hard_plates() -> list[dict[str, Any]]:
     """
     text = resources.files("replay.bench").joinpath("plate_integrals.json").read_text(encoding="utf-8")
     cases: list[dict[str, Any]] = json.loads(text)["cases"]
-    return [{**case, "triangle": np.array(case["triangle"]), "truth": float(case["integral"])} for case in cases]
+    questions = [{**case, "triangle": np.array(case["triangle"]), "truth": float(case["integral"])} for case in cases]
+    scaled = []
+    for k, question in enumerate(questions):
+        scale = 2.0 ** float(SCALES[7 * k % len(SCALES)])
+        sizes = {name: scale * np.array(question[name]) for name in ("triangle", "half_size")}
+        scaled.append({**question, **sizes, "family": "scale 1e-9..1e6", "truth": scale * question["truth"]})
+    return questions + scaled
 
 
 def hard_boxes(count: int, *, seed: int = 9) -> list[dict[str, Any]]:
@@ -152,4 +195,10 @@ def hard_boxes(count: int, *, seed: int = 9) -> list[dict[str, Any]]:
         for T in rotations(rng, count):
             order = rng.permutation(len(points))
             questions.append({"family": family, "points": points[order] @ T[:3, :3].T + T[:3, 3], "volume": volume})
-    return questions
+    changed = []
+    for k, question in enumerate(questions):
+        scale, shift = 2.0 ** float(SCALES[7 * k % len(SCALES)]), 10.0 ** (k % 9) * rng.normal(size=3)
+        points, volume = question["points"], question["volume"]
+        changed.append({"family": "scale 1e-9..1e6", "points": scale * points, "volume": scale**3 * volume})
+        changed.append({"family": OFFSET, "points": points + shift, "volume": volume})
+    return questions + changed

@@ -69,11 +69,6 @@ class Row:
     missed: int = 0
     note: str = ""
 
-    @property
-    def microseconds(self) -> float:
-        """Median time per query [us]."""
-        return 1e6 * self.median
-
 
 LEAST_ROUND = 5e-4
 """[s] A contender that is faster is called several times a round; long rounds would all meet a pause of the machine."""
@@ -135,34 +130,3 @@ def absent(case: str, method: str, why: str) -> Row:
     """Return the row of a peer that cannot take part; it says why instead of vanishing from the table."""
     nan = math.nan
     return Row(case, method, nan, nan, nan, 0, nan, 0, 0, failed=False, note=why)
-
-
-def ratio(rows: Sequence[Row], case: str, slower: str, faster: str) -> float:
-    """Return how many times faster one method is than another in a case; NaN if either is absent or failed.
-
-    The fastest rounds are compared: other programs can only add time, and on a busy machine they do so in most rounds.
-    """
-    found = {row.method: row for row in rows if row.case == case}
-    if slower not in found or faster not in found or found[faster].failed:
-        return math.nan
-    return found[slower].low / found[faster].low
-
-
-@dataclass(frozen=True)
-class Goal:
-    """A figure the project promises, beside what this run measured."""
-
-    what: str
-    target: str
-    measured: float
-    required: float
-    unit: str = "x"
-    at_least: bool = True
-
-    @property
-    def verdict(self) -> str:
-        """Return "met", "missed", or "not measured" when the run could not produce the figure."""
-        if math.isnan(self.measured):
-            return "not measured"
-        met = self.measured >= self.required if self.at_least else self.measured <= self.required
-        return "met" if met else "missed"

@@ -1,4 +1,4 @@
-"""66 pairs over the frames of a motion: our pipeline against python-fcl frame by frame."""
+"""66 pairs over the frames of a motion: our pipeline against python-fcl and coal frame by frame."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.bench import carm
-from replay.bench.engines import PEERS, fcl_geometry
-from replay.bench.measure import Check, Contender, Goal, absent, compete, ratio
+from replay.bench.engines import PEERS, coal_geometry, fcl_geometry
+from replay.bench.goals import advantage
+from replay.bench.measure import Check, Contender, absent, compete
 from replay.bench.report import Report
 from replay.bench.truth import proven_distance
 from replay.collision.columns import Level
@@ -24,6 +25,7 @@ Answer = Callable[[], Flags]
 TITLE = "a motion: contacts of 66 pairs in every frame"
 OURS, OURS_NEAR = "replay, blocks of frames", "replay, with clearances below 5 cm"
 FCL, FCL_MANAGER = "python-fcl, each pair each frame", "python-fcl, its broad phase each frame"
+COAL = "coal, each pair each frame"
 
 UNDETERMINED = 1e-12
 """[m] Nearer to touching than this, either answer is right."""
@@ -49,16 +51,16 @@ def add_to(report: Report, *, frames: int, rounds: int) -> None:
 
     near = pipeline(poses, clearance="near")
     contenders = [Contender(OURS, ours, expected.size, check), Contender(OURS_NEAR, near, expected.size, check)]
-    why = next(peer for peer in PEERS if peer.package == "fcl").missing()
-    if not why:
-        contenders.append(Contender(FCL, _fcl_pairs(poses), expected.size, check))
-        contenders.append(Contender(FCL_MANAGER, _fcl_manager(poses), expected.size, check))
-    rows = compete(case, contenders, rounds=rounds)
-    rows += [absent(case, name, why) for name in (FCL, FCL_MANAGER) if why]
+    missing = []
+    for package, peers in _PEERS.items():
+        why = next(peer for peer in PEERS if peer.package == package).missing()
+        missing += [absent(case, name, why) for name in peers if why]
+        contenders += [Contender(name, make(poses), expected.size, check) for name, make in peers.items() if not why]
+    rows = compete(case, contenders, rounds=rounds) + missing
     report.tables[TITLE] = rows
     report.notes.append(f"Contacts are {expected.mean():.1%} of the pair-frames of the motion.")
-    what = f"GJK boolean, {case} of a motion, against python-fcl"
-    report.goals.append(Goal(what, ">= 10x", ratio(rows, case, FCL, OURS), 10.0))
+    report.goals.append(advantage("motion.fcl", rows, [case], FCL, OURS))
+    report.goals.append(advantage("motion.coal", rows, [case], COAL, OURS))
 
 
 def pipeline(poses: LinkPoses, **options: Any) -> Answer:
@@ -135,3 +137,31 @@ def _fcl_manager(poses: LinkPoses) -> Answer:
         return found
 
     return answer
+
+
+def _coal_pairs(poses: LinkPoses) -> Answer:
+    import coal
+
+    shapes = [coal_geometry(coal, body) for body in carm.bodies()]
+    placed = [[coal.Transform3s(T[:3, :3].copy(), T[:3, 3].copy()) for T in frame] for frame in poses.world]
+    pairs = [(pair.a, pair.b, coal.ComputeCollision(shapes[pair.a], shapes[pair.b])) for pair in carm.all_pairs()]
+    question, contacts = coal.CollisionRequest(), coal.CollisionResult()
+    question.enable_contact = False  # a boolean is asked for, no depth
+
+    def answer() -> Flags:
+        found = np.empty((len(placed), len(pairs)), dtype=np.bool_)
+        for f, frame in enumerate(placed):
+            for p, (a, b, collide) in enumerate(pairs):
+                contacts.clear()
+                collide(frame[a], frame[b], question, contacts)
+                found[f, p] = contacts.isCollision()
+        return found
+
+    answer.keep = shapes  # type: ignore[attr-defined]  # the functors hold bare pointers
+    return answer
+
+
+_PEERS: dict[str, dict[str, Callable[[LinkPoses], Answer]]] = {
+    "fcl": {FCL: _fcl_pairs, FCL_MANAGER: _fcl_manager},
+    "coal": {COAL: _coal_pairs},
+}

@@ -1,11 +1,7 @@
-"""What a benchmark leaves behind: bench.json, tables as text, and one self-contained HTML page with plots."""
+"""What one benchmark found: tables of timed rows, tables of another shape, goals and plots; as text and as JSON."""
 
 from __future__ import annotations
 
-import base64
-import html
-import io
-import json
 import math
 import os
 import platform
@@ -15,8 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from replay.bench.measure import Goal, Row
-from replay.errors import WriteError
+from replay.bench.goals import Goal
+from replay.bench.measure import Row
 
 PACKAGES = (
     "numpy",
@@ -43,6 +39,7 @@ class Plot:
         joined: whether the points of a name are joined by a line.
         front: whether the Pareto front is drawn: the points that no other beats in x and in y.
         crossed: points of methods that missed something, drawn with a cross; they are not on the front.
+        headline: whether it is among those that stand for the whole run.
     """
 
     title: str
@@ -52,6 +49,7 @@ class Plot:
     joined: bool = False
     front: bool = False
     crossed: list[tuple[float, float]] = field(default_factory=list)
+    headline: bool = False
 
 
 LEAST_ERROR = 1e-17
@@ -83,62 +81,21 @@ class Report:
     def as_json(self) -> dict[str, Any]:
         """Return the report as JSON values; NaN and infinities are written as null."""
         return {
-            "benchmark": self.name,
-            "machine": machine(),
             "tables": {title: [_finite(asdict(row)) for row in rows] for title, rows in self.tables.items()},
             "grids": {title: grid.lines for title, grid in self.grids.items()},
-            "goals": [_finite({**asdict(goal), "verdict": goal.verdict}) for goal in self.goals],
+            "goals": [goal.as_json() for goal in self.goals],
             "notes": self.notes,
         }
 
     def as_text(self) -> str:
-        """Return the tables and goals as plain text."""
+        """Return tables and notes as plain text."""
         parts = []
         for title, rows in self.tables.items():
-            parts.append(f"{title}\n" + _align([_HEADINGS, *(_cells(row) for row in rows)]))
+            parts.append(f"{title}\n" + align(cells_of(rows)))
         for title, grid in self.grids.items():
-            parts.append(f"{title}\n" + _align(grid.cells()))
-        if self.goals:
-            cells = [("goal", "target", "measured", "verdict"), *(_goal_cells(goal) for goal in self.goals)]
-            parts.append("goals\n" + _align(cells))
+            parts.append(f"{title}\n" + align(grid.cells()))
         parts.extend(self.notes)
         return "\n\n".join(parts)
-
-    def write(self, directory: Path) -> tuple[Path, Path]:
-        """Write `<name>.json` and `<name>.html` into a directory and return their paths."""
-        data, page = directory / f"{self.name}.json", directory / f"{self.name}.html"
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            data.write_text(json.dumps(self.as_json(), indent=1) + "\n", encoding="utf-8")
-            page.write_text(self.as_html(), encoding="utf-8")
-        except OSError as error:
-            raise WriteError(str(directory), error.strerror or str(error)) from error
-        return data, page
-
-    def as_html(self) -> str:
-        """Return one HTML page that needs no other file."""
-        facts = "".join(f"<li>{html.escape(f'{key}: {value}')}</li>" for key, value in machine().items())
-        goals = [("goal", "target", "measured", "verdict"), *(_goal_cells(goal) for goal in self.goals)]
-        tables = "".join(
-            f"<h2>{html.escape(title)}</h2>{_html_table([_HEADINGS, *(_cells(row) for row in rows)])}"
-            for title, rows in self.tables.items()
-        )
-        tables += "".join(
-            f"<h2>{html.escape(title)}</h2>{_html_table(grid.cells())}" for title, grid in self.grids.items()
-        )
-        pictures = "".join(
-            f'<figure><img alt="{html.escape(plot.title)}" src="data:image/png;base64,{_png(plot)}"></figure>'
-            for plot in self.plots
-        )
-        notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
-        return _PAGE.format(
-            title=html.escape(self.name),
-            facts=facts,
-            goals=_html_table(goals) if self.goals else "",
-            tables=tables,
-            pictures=pictures,
-            notes=notes,
-        )
 
 
 def machine() -> dict[str, str]:
@@ -167,13 +124,16 @@ def _processor() -> str:
     return names[0] if names else platform.machine()
 
 
-def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None) -> Plot:
+def pareto_plot(
+    title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None, *, headline: bool = False
+) -> Plot:
     """Return error over time per query for the rows that did not fail, the Pareto front marked.
 
     Args:
         title, error: texts; `error` says what the error is measured in.
         rows: of one case.
         groups: name of the line a method belongs to; its own name where it is not listed.
+        headline: see `Plot`.
     """
     lines: dict[str, list[tuple[float, float]]] = {}
     crossed = []
@@ -183,7 +143,7 @@ def pareto_plot(title: str, rows: Sequence[Row], error: str, groups: dict[str, s
             lines.setdefault(name, []).append((row.median, row.worst_error))
             if row.missed:
                 crossed.append((row.median, row.worst_error))
-    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed)
+    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed, headline=headline)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -198,6 +158,11 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, flo
 _HEADINGS = ("case", "method", "us/query", "fastest", "slowest", "worst error", "mean error", "wrong", "note")
 
 
+def cells_of(rows: Sequence[Row]) -> list[tuple[str, ...]]:
+    """Return headings and timed rows as texts."""
+    return [_HEADINGS, *(_cells(row) for row in rows)]
+
+
 def _cells(row: Row) -> tuple[str, ...]:
     if row.rounds == 0:
         return (row.case, row.method, "", "", "", "", "", "", row.note)
@@ -208,60 +173,13 @@ def _cells(row: Row) -> tuple[str, ...]:
     return (row.case, row.method, *times, f"{row.worst_error:.2g}", mean, f"{row.wrong}/{row.queries}", note)
 
 
-def _goal_cells(goal: Goal) -> tuple[str, ...]:
-    measured = "" if math.isnan(goal.measured) else f"{goal.measured:.3g} {goal.unit}"
-    return (goal.what, goal.target, measured, goal.verdict)
-
-
-def _align(rows: Sequence[Sequence[str]]) -> str:
+def align(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells as lines of text in columns."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )
 
 
-def _html_table(rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in rows[0])
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in row) + "</tr>" for row in rows[1:])
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
 def _finite(values: dict[str, Any]) -> dict[str, Any]:
     return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in values.items()}
-
-
-def _png(plot: Plot) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 5.0), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
-    drawn = {
-        name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points) for name, points in plot.lines.items()
-    }
-    for name, line in drawn.items():
-        axes.plot(*zip(*line, strict=True), "o-" if plot.joined else "o", label=name, markersize=5)
-    if plot.front and drawn:
-        crossed = {(x, max(y, LEAST_ERROR)) for x, y in plot.crossed}
-        front = pareto_front([point for line in drawn.values() for point in line if point not in crossed])
-        if front:
-            axes.step(*zip(*front, strict=True), "k--", where="post", linewidth=1, label="Pareto front")
-            axes.plot(*zip(*front, strict=True), "ko", markersize=11, fillstyle="none")
-        if crossed:
-            axes.plot(*zip(*crossed, strict=True), "kx", markersize=10, label="misses something")
-    axes.grid(visible=True, which="major", alpha=0.3)
-    if drawn:
-        axes.legend(fontsize=8)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return base64.b64encode(buffer.getvalue()).decode("ascii")
-
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>replay bench {title}</title><style>
-body {{ font: 14px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 70rem; padding: 0 1rem; color: #1d2329; }}
-table {{ border-collapse: collapse; margin: .5rem 0 1.5rem; }}
-th, td {{ border-bottom: 1px solid #d7dce1; padding: .2rem .7rem; text-align: left; }}
-td {{ font-variant-numeric: tabular-nums; }}
-img {{ max-width: 100%; }} ul {{ color: #56616c; }}
-</style></head><body><h1>replay bench {title}</h1><ul>{facts}</ul>{goals}{tables}{pictures}{notes}</body></html>
-"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import time
 from pathlib import Path
 
 import click
@@ -10,19 +11,22 @@ import click
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, say
 
-BENCHMARKS = ("collision", "distance", "capacitive", "pipeline", "stability")
+BENCHMARKS = (
+    *("collision", "distance", "capacitive", "pipeline", "savings"),
+    *("scaling", "stability", "recording", "diff", "start"),
+)
 
 
 @click.command()
 @click.argument("names", nargs=-1, type=click.Choice(BENCHMARKS), metavar="[" + "|".join(BENCHMARKS) + "]...")
-@click.option("--quick", is_flag=True, help="Fewer queries and rounds: about a minute each.")
+@click.option("--quick", is_flag=True, help="Fewer queries and rounds: about a minute in all.")
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
     default=Path("recordings/bench"),
     show_default=True,
-    help="Folder for NAME.json and NAME.html.",
+    help="Folder for bench.json, bench.html and bench.png.",
 )
 @format_option
 def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitCode:
@@ -30,19 +34,15 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
 
     All benchmarks when none is named. Exit code 1: a goal is missed.
     """
-    from replay.bench.report import Report
+    from replay.bench import results
 
-    reports: list[Report] = []
+    reports = []
     for name in names or BENCHMARKS:
-        note(f"bench {name} ...")
-        report: Report = importlib.import_module(f"replay.bench.{name}").run(quick=quick)
-        for path in report.write(output):
-            note(f"wrote {path}")
-        reports.append(report)
-    say(
-        form,
-        lambda: "\n\n".join(report.as_text() for report in reports),
-        lambda: [report.as_json() for report in reports],
-    )
-    missed = any(goal.verdict == "missed" for report in reports for goal in report.goals)
+        begin = time.perf_counter()
+        reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
+        note(f"bench {name}: {time.perf_counter() - begin:.0f} s")
+    for path in results.write(reports, output):
+        note(f"wrote {path}")
+    say(form, lambda: results.as_text(reports), lambda: results.as_json(reports))
+    missed = any(goal.failed for report in reports for goal in report.goals)
     return ExitCode.DIFFERENT if missed else ExitCode.FINE

@@ -12,6 +12,7 @@ from replay.cli import options
 from replay.cli.exit_codes import ExitCode
 
 FILE = click.Path(path_type=Path)
+MISSING = click.Choice(["fail", "create", "skip"])
 
 
 @click.command()
@@ -19,7 +20,7 @@ FILE = click.Path(path_type=Path)
 @click.option("--baseline", type=FILE, required=True, help="Folder of accepted recordings; see `replay accept`.")
 @options.output_option("regress")
 @click.option("--rules", type=FILE, help="Tolerances; rules.yaml beside SCENARIOS when left out.")
-@click.option("--missing-baseline", "missing", type=click.Choice(["fail", "create", "skip"]), default="fail")
+@click.option("--missing-baseline", "missing", type=MISSING, default="fail", help="What a scenario without one is.")
 @click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
 @click.option("--history", type=FILE, help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @options.model_option
@@ -41,10 +42,9 @@ def regress(
     Exit codes: 1 something differs; 4 a scenario failed or has no baseline; 130 interrupted (the reports are partial).
     """
     from replay.batch.regress import regress as judge
-    from replay.batch.reports import describe, write_reports
     from replay.batch.select import Selection, rules_beside
     from replay.cli.progress import RunProgress
-    from replay.cli.results import regression_code
+    from replay.cli.results import report
     from replay.comparison.rules_file import read_rules
 
     settings = options.settings(how)
@@ -56,6 +56,4 @@ def regress(
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
     with RunProgress() as watch:
         found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
-        write_reports(found, history=history)
-    click.echo("\n".join([*describe(found), f"report: {output / 'index.html'}"]))
-    return regression_code(found)
+    return report(found, history=history)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 @options.shard_option
 @options.execution_options
 @click.option("--no-rrd", is_flag=True, help="Record MCAP only.")
+@click.option("--no-savings", is_flag=True, help="Compute what a scene does not need too, as a check; slow.")
 @click.option("--overwrite", is_flag=True, help="Replace recordings that exist.")
 @click.option("--resume", is_flag=True, help="Keep recordings whose inputs and versions are the same; run the others.")
 @options.format_option
@@ -31,8 +32,7 @@ def run(
     patterns: tuple[str, ...],
     shard: Shard | None,
     no_rrd: bool,
-    overwrite: bool,
-    resume: bool,
+    no_savings: bool,
     form: str,
     **how: Any,
 ) -> ExitCode:
@@ -45,14 +45,14 @@ def run(
     from replay.cli.progress import RunProgress
     from replay.cli.results import exit_code, show
 
-    if overwrite and resume:
+    if how["overwrite"] and how["resume"]:
         raise click.UsageError("--overwrite and --resume exclude each other")
     settings = options.settings(how)
     chosen = Selection.of(scenarios, patterns, shard).chosen
     if not chosen:
         return options.nothing(patterns)
     with RunProgress() as watch:
-        flags: dict[str, Any] = {"rrd": not no_rrd, "overwrite": overwrite, "resume": resume}
-        done = run_all(chosen, output, watch=watch, **flags, **settings)
+        flags = {name: how[name] for name in ("overwrite", "resume")}
+        done = run_all(chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **flags, **settings)
     show(form, done)
     return exit_code(done)

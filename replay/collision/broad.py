@@ -158,6 +158,18 @@ def sieve(
                 counts[BY_VOLUME] += 1
 
 
+@leaf_kernel
+def keep_all(
+    volumes: Volumes, pairs: Integers, poses: Floats, turns: Floats, level: Bytes, task: Bytes, scratch: Floats
+) -> None:
+    """Fill level as `sieve` does, and task with RUN: no pair and frame is left out. Arguments as of `sieve`."""
+    for p in range(len(pairs)):
+        a, b, q, link = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
+        for f in range(level.shape[0]):
+            level[f, p] = volumes_meet(volumes, a, b, poses[q, f], turns[link, f], scratch)
+            task[f, p] = RUN
+
+
 @inlined_kernel
 def _same(a: Floats, b: Floats) -> bool:
     for i in range(a.shape[0]):

@@ -9,6 +9,7 @@ from replay.collision import traversal
 from replay.collision.bodies import Bodies
 from replay.collision.broad import REPEAT, RUN
 from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, workspace
+from replay.collision.scan import closest_of_all
 from replay.collision.traversal import STACK, closest, contains_part
 from replay.numerics.jit import kernel
 
@@ -34,6 +35,7 @@ def decide(
     clearance: Floats,
     undecided: Flags,
     counts: Integers,
+    savings: bool,
 ) -> None:
     """Finish level, clearance and undecided, all (n, P), where task asks for it.
 
@@ -45,6 +47,7 @@ def decide(
         clearance: in NaN, out [m].
         undecided: in False, out.
         counts: (COUNTS,) added to.
+        savings: whether box trees and the last frame's answer may shorten the search.
     """
     work = workspace()
     nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
@@ -66,7 +69,10 @@ def decide(
                 for j in range(3):
                     rotation[i, j] = poses[q, f, i, j]
             counts[RUNS] += 1
-            status, distance = closest(bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts)
+            if savings:
+                status, distance = closest(bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts)
+            else:
+                status, distance = closest_of_all(bodies, a, b, rotation, translation, limit, work, counts)
             if status == SEPARATED and level[f, p] > 0:
                 held = bodies.surface[a] and contains_part(bodies, a, b, rotation, translation, False)
                 held = held or (bodies.surface[b] and contains_part(bodies, b, a, rotation, translation, True))

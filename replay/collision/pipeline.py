@@ -70,10 +70,13 @@ class CollisionPipeline:
         clearance: "never"; "near": exact up to `margin`; "always": of every pair in every frame, however far, which
             costs n^2 of n bodies and needs listed pairs.
         margin: [m], for "near".
+        savings: False decides every listed pair in every frame anew: no bodies, blocks or frames are ruled out by
+            bounding volumes, nothing is taken from another frame, all convex sets of two bodies are compared, and
+            clearances are computed however far. The columns are the same, clearances within their accuracy.
 
     Raises:
         InvalidValue: an unknown option, a margin that is not finite and positive, a pair that is listed twice, or
-            "always" with rules.
+            "always" or no savings with rules.
         MissingPackageError: "fcl" without python-fcl.
     """
 
@@ -88,6 +91,7 @@ class CollisionPipeline:
         pieces: Pieces = "exact",
         clearance: Literal["never", "near", "always"] = "near",
         margin: float = 0.05,
+        savings: bool = True,
     ) -> None:
         if clearance not in ("never", "near", "always"):
             raise InvalidValue("clearance", clearance, "must be one of never, near, always")
@@ -97,11 +101,16 @@ class CollisionPipeline:
             raise InvalidValue("margin", margin, "must be finite and positive [m]")
         if clearance == "always" and isinstance(pairs, PairRules):
             raise InvalidValue("clearance", clearance, "needs listed pairs: with rules, write never or near")
+        if not savings and isinstance(pairs, PairRules):
+            raise InvalidValue("savings", savings, "needs listed pairs: with rules, leave it on")
+        self._savings = savings
         self._limit = {"never": 0.0, "near": float(margin), "always": math.inf}[clearance]
         self._linkage = linkage
         self._uses_world = bounds == "aabb"
         # boxes along the world's axes turn with their links' common base: such pairs are evaluated in every frame
-        self._pairs = Ruled(pairs) if isinstance(pairs, PairRules) else Listed(pairs, turning=self._uses_world)
+        self._pairs = (
+            Ruled(pairs) if isinstance(pairs, PairRules) else Listed(pairs, turning=self._uses_world or not savings)
+        )
         self.counters = Counters(pairs=self._pairs.count, static_pairs=self._pairs.static_count)
         self._used = self._pairs.bodies()
         chosen = [bodies[k] for k in self._used]
@@ -109,14 +118,14 @@ class CollisionPipeline:
         self._place = np.full(len(bodies), -1, dtype=np.int64)
         self._place[self._used] = np.arange(len(chosen))
         self._all: Selected | None = None  # what every block looks at, where that is all pairs
-        if isinstance(self._pairs, Listed) and (self._pairs.count <= FEW_PAIRS or clearance == "always"):
+        if isinstance(self._pairs, Listed) and (self._pairs.count <= FEW_PAIRS or clearance == "always" or not savings):
             self._all = self._pairs.all()
             self._always = self._batches(self._all.moving())
         self._static: list[_Found] | None = None
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
-            self._decide = _engine(narrowphase, chosen, arrays)
+            self.narrow_phase = _engine(narrowphase, chosen, arrays, savings)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -219,8 +228,15 @@ class CollisionPipeline:
         clearance, undecided = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
-        broad.sieve(self._volumes, batch.rows, relative, turns, self._limit, level, task, sieved, spreads, scratch)
-        self._decide(batch.rows, relative, self._limit, task, level, clearance, undecided, decided)
+        limit = self._limit
+        if self._savings:
+            broad.sieve(self._volumes, batch.rows, relative, turns, limit, level, task, sieved, spreads, scratch)
+        else:
+            broad.keep_all(self._volumes, batch.rows, relative, turns, level, task, scratch)
+            limit = math.inf if limit > 0.0 else 0.0
+        self.narrow_phase(batch.rows, relative, limit, task, level, clearance, undecided, decided)
+        if not self._savings:
+            clearance[clearance > self._limit] = np.nan
         self.counters.add(sieved.tolist(), decided.tolist())
         return _Found(batch.columns, batch.rows[:, :2], level, clearance, undecided)
 
@@ -268,7 +284,7 @@ class _Found:
     undecided: NDArray[np.bool_]
 
 
-def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies) -> NarrowPhase:
+def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings: bool) -> NarrowPhase:
     if name == "fcl":
         from replay.collision.fcl_engine import FclEngine
 
@@ -284,6 +300,6 @@ def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies) -> Narro
         undecided: NDArray[np.bool_],
         counts: Integers,
     ) -> None:
-        narrow.decide(arrays, pairs, poses, limit, task, level, clearance, undecided, counts)
+        narrow.decide(arrays, pairs, poses, limit, task, level, clearance, undecided, counts, savings)
 
     return decide

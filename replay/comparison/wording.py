@@ -17,6 +17,7 @@ from replay.comparison.difference import (
     Worst,
 )
 from replay.comparison.rules import EXACT, Rule
+from replay.comparison.signals import ROTATION_FIELD
 
 SHOWN_EVENTS = 5
 """Events of a signal in the short form."""
@@ -44,11 +45,11 @@ def moment(at: Moment) -> str:
 
 def change(item: Change) -> str:
     """Return "name: old -> new", with what one run lacks as "-"."""
-    return f"{item.name}: {_shown(item.baseline)} -> {_shown(item.candidate)}"
+    return f"{item.name}: {shown(item.baseline)} -> {shown(item.candidate)}"
 
 
-def _shown(value: str | None) -> str:
-    """Return a value with digests cut to what tells them apart."""
+def shown(value: str | None) -> str:
+    """Return a value with digests cut to what tells them apart, and "-" for what a run lacks."""
     return "-" if value is None else re.sub(r"\b([0-9a-f]{12})[0-9a-f]{52}\b", r"\1...", value)
 
 
@@ -127,15 +128,15 @@ def _worst(item: SignalDifference) -> Iterator[str]:
         return
     together = relative is not None and relative.at == largest.at
     also = f" (rel {number(relative.error)})" if together and relative is not None else ""
-    yield f"worst abs {number(largest.error, unit)}{also} at {moment(largest.at)}{_values(largest, unit)}"
+    yield f"worst abs {number(largest.error, unit)}{also} at {moment(largest.at)}{_values(item, largest)}"
     if relative is not None and not together:
-        yield f"worst rel {number(relative.error)} at {moment(relative.at)}{_values(relative, unit)}"
+        yield f"worst rel {number(relative.error)} at {moment(relative.at)}{_values(item, relative)}"
 
 
-def _values(found: Worst, unit: str) -> str:
-    if found.baseline == 0.0 and found.candidate == found.error:
+def _values(item: SignalDifference, found: Worst) -> str:
+    if item.signal.field == ROTATION_FIELD.name:  # the angle between the two says it all
         return ""
-    return f": {found.baseline!r} -> {found.candidate!r} {unit}".rstrip()
+    return f": {found.baseline!r} -> {found.candidate!r} {item.signal.unit}".rstrip()
 
 
 def rule(item: Rule | None) -> str:
@@ -180,6 +181,8 @@ def summary(found: Difference) -> str:
         parts.append(f"{len(found.deciding)} of {count(found.compared, 'signal')} changed")
     if found.accepted:
         parts.append(f"{count(len(found.accepted), 'signal')} within the rules")
+    if found.expired:
+        parts.append(f"{count(len(found.expired), 'expired rule')} would have applied")
     if found.provenance:
         parts.append(f"{count(len(found.provenance), 'difference')} of provenance")
     return ", ".join(parts) or f"all {count(found.compared, 'signal')} equal in {count(found.frames.matched, 'frame')}"

@@ -10,15 +10,13 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-
 from replay.errors import RecordingError
-from replay.logs.mcap_chunks import Run, read_message, records, regular_run, unpack
+from replay.logs.loss import Loss
+from replay.logs.mcap_chunks import Run, mixed_runs, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
     MAX_RECORD,
@@ -36,19 +34,6 @@ from replay.logs.mcap_records import (
     read_chunk,
     read_schema,
 )
-
-
-@dataclass(frozen=True)
-class Loss:
-    """What a salvaged file has lost.
-
-    Attributes:
-        reason: what is wrong, and where.
-        bytes: bytes at the end of the file that could not be used.
-    """
-
-    reason: str
-    bytes: int
 
 
 class McapLog:
@@ -101,6 +86,11 @@ class McapLog:
             self.close()
             raise
 
+    @property
+    def preamble_checked(self) -> bool:
+        """Whether everything before the first chunk is there and as it was written; so in any whole recording."""
+        return any(name == PREAMBLE for name, _ in self.metadata)
+
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
         return self._bytes_at(attachment.begin, attachment.size)
@@ -123,6 +113,19 @@ class McapLog:
             raise self._damage(f"its statistics claim {count} messages of one topic, more than it holds")
         return count
 
+    def chunks_with(self, channels: Collection[int]) -> list[Chunk]:
+        """Return the chunks that may hold messages of these channels, so that the others need not be unpacked.
+
+        A message index that keeps a channel quiet hides messages that the statistics count, so it is trusted where
+        there are statistics.
+        """
+        trusted = self.message_counts is not None and self.loss is None
+        return [
+            chunk
+            for chunk in self.chunks
+            if not trusted or not chunk.channels or any(channel in channels for channel in chunk.channels)
+        ]
+
     def runs(self, chunk: Chunk) -> Iterator[Run]:
         """Yield the messages of a chunk, unpacked and verified."""
         data = unpack(self._file, chunk, self._bytes_at(chunk.begin, chunk.compressed_size))
@@ -131,16 +134,9 @@ class McapLog:
             self._known(run.channel)
             yield run
             return
-        messages: list[tuple[int, int, bytes]] = []
-        for op, begin, end in records(self._file, data):
-            if op == Op.MESSAGE:
-                messages.append(read_message(self._file, chunk, data[begin:end]))
-            elif op in (Op.SCHEMA, Op.CHANNEL):
-                self._define(op, data[begin:end])
-        for channel in sorted({message[0] for message in messages}):
-            mine = [message for message in messages if message[0] == channel]
-            self._known(channel)
-            yield Run(channel, np.array([m[1] for m in mine], dtype=np.int64), None, tuple(m[2] for m in mine))
+        for run in mixed_runs(self._file, chunk, data, self._define):
+            self._known(run.channel)
+            yield run
 
     def close(self) -> None:
         """Close the file."""
@@ -181,10 +177,10 @@ class McapLog:
         head = self._bytes_at(at, RECORD_HEAD) if at + RECORD_HEAD <= self._size else b""
         op, length = struct.unpack("<BQ", head) if head else (0, 0)
         if not head or at + RECORD_HEAD + length > self._size:
+            hint = "" if self._salvage else "; `replay info` and `replay export` salvage what is whole"
             raise RecordingError(
                 self._file,
-                f"is cut at byte {self._size}, inside the record at byte {at}: its run was stopped, or it is damaged;"
-                " `replay info` and `replay export` salvage what is whole",
+                f"cut at byte {self._size}, in the record at byte {at}: its run was stopped, or it is damaged{hint}",
             )
         if length > MAX_RECORD:
             raise self._damage(
@@ -219,7 +215,10 @@ class McapLog:
             if name == PREAMBLE:
                 self._check_crc(int(values.get("crc32", "")) if values.get("crc32", "").isdecimal() else -1, crc, name)
             self.metadata.append((name, values))
-        elif self._salvage and op != Op.MESSAGE_INDEX:
+        elif op == Op.MESSAGE_INDEX:
+            if self.chunks:
+                self.chunks[-1].channels.append(cursor.unsigned(2))
+        elif self._salvage:
             raise self._damage(f"the record at byte {begin - RECORD_HEAD} is of an unknown kind")
 
     def _loose_message(self, begin: int, size: int) -> None:

@@ -35,6 +35,7 @@ def record(
     directory: str | Path,
     *,
     model: Model | str | Path | None = None,
+    savings: bool = True,
     rrd: bool = True,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -45,6 +46,7 @@ def record(
         scenario: what `load` returned.
         directory: made when it is not there.
         model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
+        savings: see `simulate`; the recording says when they were off.
         rrd: whether to make a rerun recording too.
         overwrite: replace recordings that exist; they stay when the run fails.
         progress: called after each block.
@@ -56,7 +58,7 @@ def record(
     """
     from replay.scenario.scene import build
 
-    scene = build(scenario, model=model)
+    scene = build(scenario, model=model, savings=savings)
     return record_blocks(scene, Simulation(scene).blocks(), directory, rrd=rrd, overwrite=overwrite, progress=progress)
 
 
@@ -77,7 +79,7 @@ def record_blocks(
         scenario.sources,
         frames=scene.frames,
         layout=scene.layout,
-        model=scene.model.identity(),
+        model=scene.model.identity(savings=scene.savings),
     )
     shown = view(scene)
     paths = RecordedPaths(

@@ -114,8 +114,11 @@ class Model(Part):
         """Splits of method midpoint."""
         return 4 if self.capacitive.splits is None else self.capacitive.splits
 
-    def identity(self) -> dict[str, str]:
-        """Return what is recorded of the model: every option that has an effect, methods with their revisions."""
+    def identity(self, *, savings: bool = True) -> dict[str, str]:
+        """Return what is recorded of the model: every option that has an effect, methods with their revisions.
+
+        Where savings were off, "savings" says so: last digits of some columns may differ, see `simulation.simulate`.
+        """
         result = {}
         for option in ("bounds", "narrowphase", "pieces"):
             choice = getattr(self.collision, option)
@@ -130,6 +133,8 @@ class Model(Part):
             result["capacitive.rtol"] = repr(self.rtol)
         if capacitive == "midpoint":
             result["capacitive.splits"] = str(self.splits)
+        if not savings:
+            result["savings"] = "off"
         return result
 
 

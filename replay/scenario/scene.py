@@ -24,6 +24,7 @@ from replay.scenario.load import load_model
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
+from replay.scenario.notes import notes
 from replay.scenario.script import linkage, script, transform
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
@@ -61,17 +62,19 @@ class Scene:
     Attributes:
         scenario: where it comes from.
         model: the version of each method: the scenario's own, or the one that replaces it.
+        savings: whether work is left out that the scene does not need, see `simulation.simulate`.
         linkage, script: links, joints, and how they move.
         shapes: all shapes, sorted by name.
         bodies, pairs: what is tested for collision; no bodies when no pair is.
         targets: what sensors sense, sorted by name; none when there are no sensors.
         distance_sensors, capacitive_sensors: sorted by name.
         layout: the names behind the columns of results.
-        notes: what a reader should know about the meshes, one line each.
+        notes: what a reader should know about the scenario and its meshes, one line each.
     """
 
     scenario: Scenario
     model: Model
+    savings: bool
     linkage: Linkage
     script: Script
     shapes: tuple[SceneShape, ...]
@@ -87,6 +90,17 @@ class Scene:
     def frames(self) -> int:
         """Number of frames."""
         return self.scenario.frames
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many of what there are, by what people call it."""
+        return {
+            "shapes": len(self.shapes),
+            "triangles": sum(len(shape.solid.triangles) for shape in self.shapes),
+            "pairs": len(self.pairs),
+            "distance_sensors": len(self.distance_sensors),
+            "capacitive_sensors": len(self.capacitive_sensors),
+        }
 
     @property
     def margin(self) -> float:
@@ -112,12 +126,13 @@ class Scene:
         )
 
 
-def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Scene:
+def build(scenario: Scenario, *, model: Model | str | Path | None = None, savings: bool = True) -> Scene:
     """Return the scene of a scenario.
 
     Args:
         scenario: as loaded.
         model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
+        savings: see `Scene`.
 
     Raises:
         ScenarioError: a mesh cannot be used, a shape needs too many triangles, an expectation is about a pair that is
@@ -125,7 +140,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
     """
     model = load_model(model) if isinstance(model, str | Path) else model or scenario.model
     machine = linkage(scenario)
-    scene_shapes, notes = _shapes(scenario, machine)
+    scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
     sensors = scenario.sensors
     distance = tuple(_distance_sensor(scenario, machine, name) for name in sorted(sensors.distance))
@@ -147,6 +162,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
     return Scene(
         scenario=scenario,
         model=model,
+        savings=savings,
         linkage=machine,
         script=script(scenario),
         shapes=scene_shapes,
@@ -156,7 +172,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
         distance_sensors=distance,
         capacitive_sensors=capacitive,
         layout=layout,
-        notes=notes,
+        notes=(*(note.message for note in notes(scenario)), *mesh_notes),
     )
 
 

@@ -24,6 +24,12 @@ def test_experiment_one_finds_the_splits_that_reach_a_millionth():
     assert not any(row.failed for row in rows)
 
 
+def test_the_closed_form_reaches_its_digits():
+    worst, slivers = capacitive.plate_errors()
+    assert 0.0 < worst <= 1e-12
+    assert 0.0 < slivers <= 1e-8
+
+
 def test_judge():
     truth = np.array([1.0, math.inf, 0.0])
     assert not capacitive.judge(np.array([1.0 + 1e-7, math.inf, 0.0]), truth, 1e-6).failed

@@ -6,7 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from replay.bench.measure import Check, Contender, Goal, absent, compete, exponent, ratio
+from replay.bench import goals, results
+from replay.bench.goals import PROMISES, Goal, advantage
+from replay.bench.measure import Check, Contender, absent, compete, exponent
 from replay.bench.report import Grid, Plot, Report, pareto_front, pareto_plot
 
 
@@ -22,7 +24,10 @@ def test_a_wrong_contender_is_reported_as_failed_never_as_fast():
     slow, liar = rows
     assert (slow.failed, liar.failed, liar.wrong) == (False, True, 10)
     assert 0.0 < slow.low <= slow.median <= slow.high
-    assert math.isnan(ratio(rows, "case", "slow", "liar"))
+    goal = advantage("cone.speed", rows, ["case"], "slow", "liar")
+    assert goal.measured > 10.0
+    assert goal.verdict == "wrong"
+    assert goal.failed
     report = Report("test", tables={"table": rows}, plots=[pareto_plot("plot", rows, "error")])
     assert "FAILED: wrong answers" in report.as_text()
     assert list(report.plots[0].lines) == ["slow"]
@@ -33,21 +38,37 @@ def test_an_error_that_is_no_number_fails():
     assert row.failed
 
 
-def test_ratio_is_of_fastest_rounds_and_needs_both():
+def test_an_advantage_is_of_fastest_rounds_the_least_over_cases_and_needs_both():
     rows = compete("case", [contender("slow", work=200_000), contender("fast")], rounds=3)
-    assert ratio(rows, "case", "slow", "fast") == rows[0].low / rows[1].low > 1.0
-    assert math.isnan(ratio([rows[0], absent("case", "fast", "not installed")], "case", "slow", "fast"))
-    assert math.isnan(ratio(rows, "another case", "slow", "fast"))
+    other = compete("other", [contender("slow", work=100_000), contender("fast")], rounds=3)
+    ratio = rows[0].low / rows[1].low
+    assert advantage("cone.speed", rows, ["case"], "slow", "fast") == Goal("cone.speed", ratio)
+    both = advantage("cone.speed", rows + other, ["case", "other"], "slow", "fast").measured
+    assert both == min(ratio, other[0].low / other[1].low) > 1.0
+    alone = [rows[0], absent("case", "fast", "not installed")]
+    for several, cases in ((alone, ["case"]), (rows, ["case", "another"]), (rows, [])):
+        assert advantage("cone.speed", several, cases, "slow", "fast").verdict == "not measured"
+    wrong = compete("case", [contender("liar", answer=2.0)], rounds=1)
+    assert advantage("cone.speed", wrong, ["case"], "slow", "liar").verdict == "wrong"
 
 
-@pytest.mark.parametrize(("measured", "verdict"), [(3.0, "met"), (2.9, "missed"), (math.nan, "not measured")])
+@pytest.mark.parametrize(("measured", "verdict"), [(10.0, "met"), (9.9, "missed"), (math.nan, "not measured")])
 def test_goals(measured, verdict):
-    assert Goal("what", ">= 3x", measured, 3.0).verdict == verdict
+    goal = Goal("cone.speed", measured)
+    assert (goal.verdict, goal.failed) == (verdict, verdict == "missed")
 
 
 def test_goal_from_above():
-    assert Goal("what", "0", 0.0, 0.0, at_least=False).verdict == "met"
-    assert Goal("what", "0", 1.0, 0.0, at_least=False).verdict == "missed"
+    assert Goal("stability", 0.0).verdict == "met"
+    assert Goal("stability", 1.0).verdict == "missed"
+    assert Goal("stability", 0.0, wrong=True).verdict == "wrong"
+
+
+def test_goals_stand_in_the_order_of_the_promises():
+    several = [Goal("stability", 0.0), Goal("gjk.coal", 4.0), Goal("gjk.fcl", 3.0)]
+    assert [goal.key for goal in goals.in_order(several)] == ["gjk.fcl", "gjk.coal", "stability"]
+    assert PROMISES["motion.fcl"].target == ">= 10 x (stretch 30)"
+    assert PROMISES["diff.memory"].target == "<= 1024 MiB"
 
 
 def test_exponent_of_a_power_law():
@@ -66,24 +87,33 @@ def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
         "test",
         tables={"table <1>": rows},
         grids={"grid": Grid([{"a": 1, "b": "x"}])},
-        goals=[Goal("what", ">= 3x", math.nan, 3.0)],
+        goals=[Goal("cone.speed", math.nan), Goal("gjk.fcl", 4.0)],
         plots=[
             Plot("cost", "n", "s", {"ours": [(1.0, 0.0), (10.0, 1e-3)]}, joined=True, front=True, crossed=[(1.0, 0.0)]),
-            pareto_plot("empty", [], "error"),
+            pareto_plot("empty", [], "error", headline=True),
         ],
         notes=["a note"],
     )
-    data, page = report.write(tmp_path / "new")
+    data, page, picture = results.write([report, Report("second")], tmp_path / "new")
     found = json.loads(data.read_text())
-    assert set(found) == {"benchmark", "machine", "tables", "grids", "goals", "notes"}
-    ours, peer = found["tables"]["table <1>"]
+    assert set(found) == {"machine", "goals", "benchmarks"}
+    assert set(found["benchmarks"]) == {"test", "second"}
+    assert set(found["benchmarks"]["test"]) == {"tables", "grids", "goals", "notes"}
+    ours, peer = found["benchmarks"]["test"]["tables"]["table <1>"]
     assert ours["median"] > 0.0
     assert (peer["median"], peer["note"]) == (None, "not installed")
-    assert found["goals"][0]["verdict"] == "not measured"
+    assert [(goal["key"], goal["verdict"]) for goal in found["goals"]] == [
+        ("gjk.fcl", "met"),
+        ("cone.speed", "not measured"),
+    ]
+    assert found["goals"][1]["measured"] is None
     assert "numpy" in found["machine"]["packages"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
     html = page.read_text()
     assert "table &lt;1&gt;" in html
+    assert html.index("not measured") < html.index("table &lt;1&gt;")  # the goals come first
     assert html.count("data:image/png;base64,") == 2
     assert "http" not in html.replace("http-equiv", "")
     assert "not installed" in report.as_text()
+    assert results.as_text([report]).rstrip().endswith("not measured")
     assert np.isfinite(ours["worst_error"])

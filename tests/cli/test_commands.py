@@ -70,6 +70,12 @@ def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys)
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
 
+def test_without_savings_the_recording_says_so_and_reads_the_same(scenario, recorded, tmp_path):
+    assert run(["run", str(scenario), "-o", str(tmp_path / "all"), "--no-rrd", "--no-savings"]) is ExitCode.FINE
+    assert replay.read(tmp_path / "all/swing/swing.mcap").provenance.model["savings"] == "off"
+    assert run(["diff", str(recorded / "swing.mcap"), str(tmp_path / "all/swing/swing.mcap")]) is ExitCode.FINE
+
+
 def test_a_broken_expectation_is_exit_code_4_and_named(tmp_path, capsys):
     path = tmp_path / "swing.yaml"
     path.write_text(SCENARIO.replace("EXPECTED", "always"))
@@ -99,10 +105,41 @@ def test_validate_says_place_value_rule_and_remedy(tmp_path, capsys):
     assert "60 cm" in error
 
 
+def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        "version: 1\nname: many\nrate: 10\nduration: 1\nlinks: {a: {shapes: {s: {type: cube, size: 1}}}}\n"
+        f"sweep: {{grid: {{links.a.shapes.s.size: {[-k for k in range(1000)]}}}}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.INVALID
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 101
+    assert lines[-1] == "replay: error: ... and 900 more"
+
+
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
     entry = json.loads(capsys.readouterr().out)[0]
     assert (entry["pairs"], entry["triangles"], entry["distance_sensors"]) == (1, 24, 1)
+
+
+def test_an_unusable_mesh_is_invalid_input_and_fails_one_of_many(tmp_path, capsys):
+    (tmp_path / "cut.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n0\n")
+    path = tmp_path / "bad.yaml"
+    path.write_text(
+        "version: 1\nname: bad\nrate: 10\nduration: 1\n"
+        "links: {a: {shapes: {m: {type: mesh, file: cut.ply, scale: 1}}}}\n"
+    )
+    line = f"{path}:5:44: links.a.shapes.m.file = 'cut.ply' cannot be used: is not a usable PLY file: its header"
+    assert run(["validate", str(path)]) is ExitCode.FINE
+    assert run(["validate", "--deep", str(path)]) is ExitCode.INVALID
+    assert capsys.readouterr().err.startswith(f"replay: error: {line}")
+    out = ["-o", str(tmp_path / "out"), "--no-rrd", "--overwrite"]
+    assert run(["run", str(path), *out]) is ExitCode.INVALID
+    assert line in capsys.readouterr().out
+    path.with_name("good.yaml").write_text("version: 1\nname: good\nrate: 10\nduration: 1\nlinks: {a: {}}\n")
+    assert run(["run", str(tmp_path), *out]) is ExitCode.FAILED
+    assert "good: passed" in capsys.readouterr().out
 
 
 def test_info_lists_topics_counts_and_provenance(recorded, capsys):
@@ -120,15 +157,44 @@ def test_info_lists_topics_counts_and_provenance(recorded, capsys):
 def test_info_salvages_a_cut_file_with_exit_code_3(recorded, tmp_path, capsys):
     data = (recorded / "swing.mcap").read_bytes()
     part = tmp_path / "swing.mcap.part"
-    part.write_bytes(data[: len(data) * 9 // 10])
+    part.write_bytes(data[: len(data) // 2])
     assert run(["info", str(part)]) is ExitCode.LOSSES
-    assert "salvaged" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith(f"replay: {part}: cut at byte") and said.endswith("; none of 61 frames were salvaged\n")
     cut = tmp_path / "cut.mcap"  # a copy that was stopped, say
     cut.write_bytes(part.read_bytes())
     assert run(["info", str(cut)]) is ExitCode.LOSSES
     assert run(["export", str(cut), "--format", "csv", "-o", str(tmp_path), "--topic", "/tf"]) is ExitCode.LOSSES
+    cut.write_bytes(data[:-20])
+    capsys.readouterr()
+    assert run(["info", str(cut)]) is ExitCode.LOSSES
+    assert capsys.readouterr().err.endswith("; all 61 frames were salvaged\n")
     cut.write_bytes(data[:30])
     assert run(["info", str(cut)]) is ExitCode.INVALID
+
+
+def test_a_stopped_run_is_run_again_from_what_it_left(recorded, tmp_path, capsys):
+    data = (recorded / "swing.mcap").read_bytes()
+    part = tmp_path / "swing.mcap.part"
+    part.write_bytes(data[: len(data) * 9 // 10])
+    assert run(["run", str(part), "-o", str(tmp_path), "--no-rrd"]) is ExitCode.FINE
+    assert (tmp_path / "swing" / "swing.mcap").read_bytes() == data
+    part.write_bytes(data[:900])
+    assert run(["run", str(part), "-o", str(tmp_path), "--overwrite"]) is ExitCode.INVALID
+    assert "nothing can be salvaged" in capsys.readouterr().err
+    assert run(["run", str(recorded / "swing.rrd"), "-o", str(tmp_path)]) is ExitCode.INVALID
+    assert "the .mcap beside it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_name_that_the_terminal_cannot_show_is_shown_as_escapes(recorded, tmp_path, encoding):
+    named = tmp_path / "bone 🦴.mcap"
+    named.write_bytes((recorded / "swing.mcap").read_bytes())
+    command = [sys.executable, "-m", "replay", "info", str(named)]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.startswith(str(tmp_path).encode())
 
 
 def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
@@ -151,7 +217,10 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
     ("arguments", "message"),
     [
         (["run"], "Missing argument"),
-        (["nonsense"], "No such command"),
+        (["nonsense"], "No such command 'nonsense'; run, validate"),
+        (["valdate", "x"], "No such command 'valdate'; did you mean 'validate'?; see replay --help"),
+        (["run", "x", "--workers", "0"], "'0' is no number of processes; write 1 or more; see replay run --help"),
+        (["run", "x", "--shard", "3/2"], "must be i/n with 1 <= i <= n, such as 2/4; see replay run --help"),
         (["info", "none.mcap"], "cannot be read"),
         (["view", "none.rrd"], "no such file"),
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
@@ -162,7 +231,9 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
 )
 def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     assert run(arguments) is ExitCode.INVALID
-    assert message in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.startswith("replay: error: ") and said.count("\n") == 1
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])
@@ -191,7 +262,7 @@ def test_a_crash_fails_its_scenario_and_no_other(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(replay.batch.run, "run_case", scenes.misbehave)
     assert run(["run", str(tmp_path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FAILED
     text = capsys.readouterr().out
-    assert "raise_first: crashed" in text and "crashed: MemoryError: no room for 8 GiB" in text
+    assert "raise_first: crashed" in text and "MemoryError: no room for 8 GiB" in text
     assert "second: passed" in text
     folder = tmp_path / "out" / "raise_first"
     assert "Traceback" in (folder / "log.txt").read_text()

@@ -7,7 +7,7 @@ from replay.geometry.primitives import sphere
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
 from replay.sensing.capacitive.clusters import AREA, CENTROID, FOURTH, SECOND, SPREAD4, make_clusters
-from replay.sensing.capacitive.tree_sum import sum_tree
+from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 _HALF_SIZES = np.array([[0.025, 0.1], [0.004, 0.006]])
@@ -51,7 +51,7 @@ def test_the_error_never_exceeds_the_tolerance(body, lowest, highest, both, faci
     exact, touching = sum_triangles(body, triangle_areas(body), T, _HALF_SIZES, both, facing, EXACT)
     finite = np.isfinite(exact)
     for rtol in (1e-1, 1e-3, 1e-6, 1e-9):
-        value, touches, bound = sum_tree(clusters, tree, T, _HALF_SIZES, both, facing, rtol)
+        value, touches, bound = sum_tree(clusters, tree, T, _HALF_SIZES, both, facing, rtol, np.zeros(COUNTS, np.int64))
         np.testing.assert_array_equal(np.isinf(value), ~finite)
         np.testing.assert_array_equal(touches, touching)
         expected, error = exact[finite], np.abs(value[finite] - exact[finite])

@@ -11,7 +11,7 @@ from replay.numerics.double_double import triangle_area
 from replay.sensing.capacitive import exact, plate_integral
 from replay.sensing.capacitive.clusters import make_clusters
 from replay.sensing.capacitive.pieces import share
-from replay.sensing.capacitive.tree_sum import sum_tree
+from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from tests.sensing import plate_reference
 
 _HALVES = [(1.0, 1.0), (1.0, 3.0), (0.25, 0.5), (0.3, 0.7)]
@@ -136,12 +136,16 @@ def test_the_tree_counts_pieces_in_border_planes_once(both):
         expected = plate_integral(body, half, side="both" if both else "front")
         for rtol in (1e-2, 1e-6, 1e-12):
             tree = triangle_tree(body)
-            value, _, bound = sum_tree(make_clusters(body, tree), tree, T, np.array([half]), both, False, rtol)
+            value, _, bound = sum_tree(
+                make_clusters(body, tree), tree, T, np.array([half]), both, False, rtol, np.zeros(COUNTS, np.int64)
+            )
             assert value[0, 0] == pytest.approx(expected.sum(), rel=rtol)
             assert abs(value[0, 0] - expected.sum()) <= bound[0, 0] + 1e-13 * expected.sum()
         for triangle, value in zip(body, expected, strict=True):
             tree = triangle_tree(triangle[None])
             clusters = make_clusters(triangle[None], tree)
             for rtol in (1e-3, 1e-8):
-                alone = sum_tree(clusters, tree, T, np.array([half]), both, False, rtol)[0][0, 0]
+                alone = sum_tree(clusters, tree, T, np.array([half]), both, False, rtol, np.zeros(COUNTS, np.int64))[0][
+                    0, 0
+                ]
                 assert alone == pytest.approx(value, rel=rtol)

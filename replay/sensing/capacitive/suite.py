@@ -12,10 +12,11 @@ from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float
 from replay.sensing.capacitive.clusters import Clusters, make_clusters
+from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import check_splits
 from replay.sensing.capacitive.sensor import CapacitiveSensor
-from replay.sensing.capacitive.tree_sum import sum_tree
+from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 from replay.sensing.columns import CapacitiveColumns
 from replay.sensing.target import Target
@@ -41,6 +42,11 @@ class CapacitiveSuite:
         method: "tree" meets rtol; "exact" sums the closed form of every triangle; "midpoint" is the thesis's.
         rtol: of "tree", 1e-12..1: largest relative error of each body's contribution to each plate, and so of the sum.
         splits: of "midpoint", 0..12.
+        savings: False computes every frame anew, and sums "tree" over all triangles as "exact" does: capacitances are
+            then the same within rtol, and those of the other methods bit for bit (tests/test_savings.py).
+
+    Attributes:
+        counters: what was done so far.
 
     Raises:
         InvalidValue: an option is not as stated.
@@ -56,6 +62,7 @@ class CapacitiveSuite:
         method: str = "tree",
         rtol: float = 1e-6,
         splits: int = 4,
+        savings: bool = True,
     ) -> None:
         if not isinstance(method, str) or method not in METHODS:
             raise InvalidValue("method", method, f"must be one of {', '.join(METHODS)}")
@@ -67,10 +74,12 @@ class CapacitiveSuite:
         self.targets = tuple(targets)
         self.method = method
         self.rtol = rtol
+        self.counters = CapacitiveCounters()
+        self._savings = savings
         self._splits = splits if method == "midpoint" else EXACT
         sensed = [any(sensor.senses(target.link) for sensor in self.sensors) for target in self.targets]
         self._clusters: list[Clusters | None] = [
-            make_clusters(target.triangles, target.tree) if needed and method == "tree" else None
+            make_clusters(target.triangles, target.tree) if needed and method == "tree" and savings else None
             for target, needed in zip(self.targets, sensed, strict=True)
         ]
         self._triangles = [np.ascontiguousarray(target.triangles, dtype=np.float64) for target in self.targets]
@@ -92,10 +101,15 @@ class CapacitiveSuite:
                     continue
                 links = (sensor.link, target.link)
                 if links not in distinct:
-                    distinct[links] = _distinct_poses(poses.relative(*links))
+                    T = np.ascontiguousarray(poses.relative(*links))
+                    distinct[links] = _distinct_poses(T) if self._savings else (T, np.arange(frames))
                 T_link_body, frame_of = distinct[links]
                 T_plate_body = transforms.compose(self._T_plate_link[s], T_link_body[:, None])
                 integral, touches = self._integrate(s, t, T_plate_body)
+                plates = len(sensor.plates)
+                self.counters.integrals += frames * plates
+                self.counters.triangles += frames * plates * len(target.triangles)
+                self.counters.repeated += (frames - len(T_link_body)) * plates
                 per_object[:, s, t] = sensor.permittivity * _sum_over_plates(integral)[frame_of]
                 touching[:, s] |= np.any(touches, axis=1)[frame_of]
         capacitance = np.tile(np.array([sensor.stray_capacitance for sensor in self.sensors]), (frames, 1))
@@ -120,7 +134,10 @@ class CapacitiveSuite:
         both, facing = sensor.side == "both", sensor.faces == "facing"
         half_sizes, clusters = self._half_sizes[sensor_index], self._clusters[target_index]
         if clusters is not None:
-            integral, touching, _ = sum_tree(clusters, target.tree, T_plate_body, half_sizes, both, facing, self.rtol)
+            counts = np.zeros(COUNTS, dtype=np.int64)
+            options = (half_sizes, both, facing, self.rtol)
+            integral, touching, _ = sum_tree(clusters, target.tree, T_plate_body, *options, counts)
+            self.counters.add(counts.tolist())
             return integral, touching
         triangles, areas = self._triangles[target_index], self._areas[target_index]
         return sum_triangles(triangles, areas, T_plate_body, half_sizes, both, facing, self._splits)

@@ -51,6 +51,12 @@ from replay.sensing.capacitive.triangle_sum import into_plate
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+COUNTS = 4
+NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
+"""Rows of the counters: tree nodes looked at, those summed by their moments, triangles in these, and triangles summed
+one by one; triangles behind the plate or facing away, left out node by node, are the rest."""
 
 
 @kernel
@@ -62,6 +68,7 @@ def sum_tree(
     both: bool,
     facing: bool,
     rtol: float,
+    counts: Ints,
 ) -> tuple[Floats, Flags, Floats]:
     """Return what `sum_triangles` returns, to a relative tolerance, and the rigorous bound of the error.
 
@@ -69,6 +76,7 @@ def sum_tree(
         clusters, tree: of the body, in its frame.
         T_plate_body: (n, p, 4, 4); half_sizes: (p, 2) [m]; both, facing: see `CapacitiveSensor`.
         rtol: largest relative error of each of the n x p integrals.
+        counts: (COUNTS,) added to.
 
     Returns:
         (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
@@ -94,6 +102,7 @@ def sum_tree(
                 terms,
                 corners,
                 stack,
+                counts,
             )
     return integral, touching, bound
 
@@ -112,7 +121,8 @@ def _walk(
     pieces: Floats,
     terms: Floats,
     corners: Floats,
-    stack: NDArray[np.int64],
+    stack: Ints,
+    counts: Ints,
 ) -> tuple[float, bool, float]:
     total, lost, saved, spent = 0.0, 0.0, 0.0, 0.0
     touching = False
@@ -127,6 +137,7 @@ def _walk(
     while size > 0:
         size -= 1
         index = stack[size]
+        counts[NODES] += 1
         x, y, z = _place(T, nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2])
         h, area = nodes[index, RADIUS], nodes[index, AREA]
         if not both and z + h < 0.0:
@@ -155,12 +166,15 @@ def _walk(
                         lost += e
                         saved += share - error
                         spent += error
+                        counts[CLUSTERS] += 1
+                        counts[IN_CLUSTERS] += tree.end[index] - tree.begin[index]
                         continue
         if tree.second[index] >= 0:
             stack[size] = tree.second[index]
             stack[size + 1] = index + 1
             size += 2
             continue
+        counts[ALONE] += tree.end[index] - tree.begin[index]
         for k in range(tree.begin[index], tree.end[index]):
             into_plate(T, triangles, k, corners)
             value, share, error, touches = triangle_within(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import Cone
-from replay.sensing.distance.query import closest_in_tree
+from replay.sensing.distance.query import COMPUTED, LOOKED_AT, REPEATED, closest_in_tree, closest_of_all
 from replay.sensing.distance.readings import Nearest
 
 Array = NDArray[np.float64]
@@ -44,6 +44,7 @@ def sweep_exact(
     reach: float,
     target: int,
     nearest: Nearest,
+    counts: NDArray[np.int64],
 ) -> None:
     """Update `nearest` in every frame with the target's closest point in the sensor's cone.
 
@@ -57,6 +58,7 @@ def sweep_exact(
         reach: the sensor's range [m].
         target: what to write as `nearest.target`.
         nearest: best candidates of the targets before.
+        counts: (COUNTS,) added to, see `query`.
     """
     stack, bounds = np.empty(MAX_DEPTH, dtype=np.int64), np.empty(MAX_DEPTH)
     distance, offset, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
@@ -64,16 +66,49 @@ def sweep_exact(
     for i in range(len(T_target_sensor)):
         limit = min(reach, nearest.distance[i])
         known = i > 0 and same_pose(T_target_sensor, i, i - 1) and (triangle >= 0 or limit <= searched_to)
-        if not known:
+        if known:
+            counts[REPEATED] += 1
+        else:
             pose = T_target_sensor[i]
             v = axis_of(pose)
             cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
             apex = (pose[0, 3], pose[1, 3], pose[2, 3])
-            distance, offset, triangle, case = closest_in_tree(triangles, tree, apex, cone, limit, start, stack, bounds)
+            distance, offset, triangle, case = closest_in_tree(
+                triangles, tree, apex, cone, limit, start, stack, bounds, counts
+            )
             searched_to = limit
             if triangle >= 0:
                 start = triangle
         if triangle >= 0 and distance <= limit and distance < nearest.distance[i]:
+            nearest.distance[i] = distance
+            for k in range(3):
+                nearest.offset[i, k] = offset[k]
+            nearest.target[i] = target
+            nearest.triangle[i] = triangle
+            nearest.case[i] = case
+
+
+@kernel
+def sweep_scan(
+    triangles: Array,
+    T_target_sensor: Array,
+    cos_half: float,
+    sin_half: float,
+    reach: float,
+    target: int,
+    nearest: Nearest,
+    counts: NDArray[np.int64],
+) -> None:
+    """As `sweep_exact`, by every triangle in every frame."""
+    for i in range(len(T_target_sensor)):
+        pose = T_target_sensor[i]
+        v = axis_of(pose)
+        cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
+        apex = (pose[0, 3], pose[1, 3], pose[2, 3])
+        distance, offset, triangle, case = closest_of_all(triangles, apex, cone, reach)
+        counts[LOOKED_AT] += len(triangles)
+        counts[COMPUTED] += len(triangles)
+        if triangle >= 0 and distance < nearest.distance[i]:
             nearest.distance[i] = distance
             for k in range(3):
                 nearest.offset[i, k] = offset[k]

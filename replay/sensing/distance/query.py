@@ -33,6 +33,11 @@ Array = NDArray[np.float64]
 
 LARGEST = float(np.finfo(np.float64).max)
 
+COUNTS = 4
+REPEATED, BOXES, LOOKED_AT, COMPUTED = range(COUNTS)
+"""Rows of the counters: frames answered from the one before, tree boxes bounded, triangles looked at in leaves, and
+triangles whose closest point in the cone was computed."""
+
 SLACK = 2.0 * TOUCH
 """Rounding of any distance in a query, as part of the farthest coordinate seen from the apex."""
 
@@ -136,6 +141,7 @@ def closest_in_tree(
     start: int,
     stack: NDArray[np.int64],
     bounds: Array,
+    counts: NDArray[np.int64],
 ) -> tuple[float, Vector, int, int]:
     """As `closest_of_all`, through the tree.
 
@@ -143,12 +149,15 @@ def closest_in_tree(
         reach: nothing farther than this is of interest [m].
         start: a triangle that is probably close (the last answer), or -1.
         stack, bounds: scratch of `MAX_DEPTH` entries.
+        counts: (COUNTS,) added to.
     """
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
     slack = query_slack(tree, apex)
+    boxes, seen, computed = 1, 0, 0
     limit = min(reach, LARGEST)  # so that an infinite bound is always above it
     if start >= 0:
         distance, x, which = on_triangle(triangles, start, apex, cone)
+        computed += 1
         if distance <= limit:
             best, point, triangle, case = distance, x, start, which
             limit = best
@@ -163,10 +172,12 @@ def closest_in_tree(
         while bound <= limit:
             second = tree.second[node]
             if second < 0:
+                seen += tree.end[node] - tree.begin[node]
                 for place in range(tree.begin[node], tree.end[node]):
                     k = tree.order[place]
                     if k == start or _cannot_win(triangles, k, apex, cone, limit, slack):
                         continue
+                    computed += 1
                     distance, x, which = on_triangle(triangles, k, apex, cone)
                     if distance < limit or (distance == limit and (triangle < 0 or k < triangle)):
                         best, point, triangle, case = distance, x, k, which
@@ -175,6 +186,7 @@ def closest_in_tree(
             first = node + 1
             first_bound = _node_bound(tree, first, apex, cone, slack)
             second_bound = _node_bound(tree, second, apex, cone, slack)
+            boxes += 2
             if second_bound < first_bound:
                 first, second = second, first
                 first_bound, second_bound = second_bound, first_bound
@@ -183,4 +195,7 @@ def closest_in_tree(
                 stack[top] = second
                 bounds[top] = second_bound
             node, bound = first, first_bound
+    counts[BOXES] += boxes
+    counts[LOOKED_AT] += seen
+    counts[COMPUTED] += computed
     return best, point, triangle, case

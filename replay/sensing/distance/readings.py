@@ -28,6 +28,12 @@ class Nearest(NamedTuple):
     triangle: NDArray[np.int32]  # (n,)
     case: NDArray[np.uint8]  # (n,)
 
+    def of(self, frames: slice) -> Nearest:
+        """Return the part of some frames, which shares their memory."""
+        return Nearest(
+            self.distance[frames], self.offset[frames], self.target[frames], self.triangle[frames], self.case[frames]
+        )
+
 
 def nothing_yet(frames: int) -> Nearest:
     """Return the start of a search over targets."""

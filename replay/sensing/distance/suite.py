@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.geometry.tree import triangle_tree
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.sensing.columns import DistanceColumns
 from replay.sensing.distance.closest import check_aperture, check_range
 from replay.sensing.distance.cone import half_angle
+from replay.sensing.distance.counters import DistanceCounters
 from replay.sensing.distance.embree import EmbreeBundle
-from replay.sensing.distance.exact import sweep_exact
+from replay.sensing.distance.exact import sweep_exact, sweep_scan
+from replay.sensing.distance.query import COUNTS
 from replay.sensing.distance.rays import cap_directions, sweep_rays
 from replay.sensing.distance.readings import Nearest, empty_columns, nothing_yet, write_sensor
 from replay.sensing.distance.thesis import sweep_thesis
@@ -75,6 +78,11 @@ class DistanceSuite:
         method: "exact"; "rays", a bundle of `count` rays; or "thesis", the thesis's own steps with their failures.
         count: number of rays, 1 or more; used by "rays" only.
         engine: "own" or "embree" (float32, needs the package embreex); used by "rays" only.
+        savings: False looks at every triangle in every frame, and takes nothing from the frame before; the readings are
+            the same bit for bit (tests/test_savings.py).
+
+    Attributes:
+        counters: what was done so far.
 
     Raises:
         InvalidValue: an unknown method or engine, or a count below 1.
@@ -89,6 +97,7 @@ class DistanceSuite:
         method: str = "exact",
         count: int = 1000,
         engine: str = "own",
+        savings: bool = True,
     ) -> None:
         if method not in METHODS:
             raise InvalidValue("method", method, f"must be one of {', '.join(METHODS)}")
@@ -100,6 +109,8 @@ class DistanceSuite:
         self.targets = tuple(targets)
         self.method = method
         self._count = count
+        self._savings = savings
+        self.counters = DistanceCounters()
         self._sweep = self._sweeper(engine)
 
     def run(self, poses: LinkPoses) -> DistanceColumns:
@@ -121,7 +132,14 @@ class DistanceSuite:
                     continue
                 pose = transforms.compose(poses.relative(target.link, sensor.link), sensor.T_link_sensor)
                 T_target_sensor[index] = np.ascontiguousarray(pose)
-                self._sweep(sensor, index, T_target_sensor[index], nearest)
+                self.counters.readings += frames
+                self.counters.triangles += frames * len(target.triangles)
+                if self._savings:
+                    self._sweep(sensor, index, T_target_sensor[index], nearest)
+                    continue
+                for frame in range(frames):  # alone, a frame has none before it
+                    part = slice(frame, frame + 1)
+                    self._sweep(sensor, index, T_target_sensor[index][part], nearest.of(part))
             write_sensor(columns, column, nearest, self.targets, T_target_sensor, poses, sensor.min_range)
         return columns
 
@@ -132,6 +150,10 @@ class DistanceSuite:
             return self._thesis
         self._patterns = [cap_directions(sensor.aperture, self._count) for sensor in self.sensors]
         if engine == "own":
+            self._trees = [
+                target.tree if self._savings else triangle_tree(target.triangles, leaf_size=len(target.triangles))
+                for target in self.targets
+            ]
             return self._rays
         bundles = [EmbreeBundle(target.triangles) for target in self.targets]
 
@@ -146,12 +168,17 @@ class DistanceSuite:
     def _exact(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
         target = self.targets[index]
         cos_half, sin_half = half_angle(sensor.aperture)
-        sweep_exact(target.triangles, target.tree, pose, cos_half, sin_half, sensor.range, index, nearest)
+        cone, counts = (cos_half, sin_half, sensor.range), np.zeros(COUNTS, dtype=np.int64)
+        if self._savings:
+            sweep_exact(target.triangles, target.tree, pose, *cone, index, nearest, counts)
+        else:
+            sweep_scan(target.triangles, pose, *cone, index, nearest, counts)
+        self.counters.add(counts.tolist())
 
     def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
         cos_half = math.cos(0.5 * sensor.aperture)
         sweep_thesis(self.targets[index].triangles, pose, cos_half, sensor.range, index, nearest)
 
     def _rays(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
-        target = self.targets[index]
-        sweep_rays(target.triangles, target.tree, pose, self._pattern(sensor), sensor.range, index, nearest)
+        triangles = self.targets[index].triangles
+        sweep_rays(triangles, self._trees[index], pose, self._pattern(sensor), sensor.range, index, nearest)

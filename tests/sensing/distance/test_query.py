@@ -8,20 +8,20 @@ import pytest
 from replay.geometry.tree import MAX_DEPTH, triangle_tree
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import Cone, half_angle
-from replay.sensing.distance.query import closest_in_tree, closest_of_all
+from replay.sensing.distance.query import COUNTS, closest_in_tree, closest_of_all
 from tests.sensing.distance.meshes import grid_of_cubes, torus
 
 
 @kernel
 def all_answers(triangles, tree, apexes, axes, half_angles, reaches, starts, walk):
     stack, bounds = np.empty(MAX_DEPTH, dtype=np.int64), np.empty(MAX_DEPTH)
-    answers = np.empty((len(apexes), 6))
+    answers, counts = np.empty((len(apexes), 6)), np.zeros(COUNTS, dtype=np.int64)
     for i in range(len(apexes)):
         cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1])
         apex = (apexes[i, 0], apexes[i, 1], apexes[i, 2])
         if walk:
             distance, x, triangle, case = closest_in_tree(
-                triangles, tree, apex, cone, reaches[i], starts[i], stack, bounds
+                triangles, tree, apex, cone, reaches[i], starts[i], stack, bounds, counts
             )
         else:
             distance, x, triangle, case = closest_of_all(triangles, apex, cone, reaches[i])
