@@ -67,7 +67,9 @@ class Engine:
 def _ours(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
     """All poses in one call, as the pipeline works; every query starts afresh, as an unrelated one does."""
     first, second = Convex(a.vertices), Convex(b.vertices)
-    T_a_b = np.ascontiguousarray(transforms.compose(transforms.invert(T_world_a), T_world_b))
+    here, there = T_world_a.copy(), T_world_b.copy()
+    here[:, :3, 3], there[:, :3, 3] = 0.0, T_world_b[:, :3, 3] - T_world_a[:, :3, 3]  # far away, nothing is rounded off
+    T_a_b = np.ascontiguousarray(transforms.compose(transforms.invert(here), there))
     contact = Status.CONTACT.value
 
     def hits() -> Flags:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from replay.collision.bodies import AABB, SPHERE, Volumes
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -48,7 +48,7 @@ def spread(poses: Floats) -> tuple[float, float]:
     return math.sqrt(shift), math.sqrt(turn)
 
 
-@leaf_kernel
+@inlined_kernel
 def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
     """Return a lower bound on the distance [m] of two bodies, from their spheres, b's link at pose (4, 4) in a's."""
     c, o = volumes.center[b], volumes.center[a]
@@ -61,7 +61,7 @@ def sphere_gap(volumes: Volumes, a: int, b: int, pose: Floats) -> float:
     return gap
 
 
-@leaf_kernel
+@inlined_kernel
 def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, scratch: Floats) -> bool:
     """Return whether two bodies' volumes meet; errs only towards meeting.
 
@@ -127,12 +127,16 @@ def sieve(
     """
     n = level.shape[0]
     for q in range(len(poses)):
-        spreads[q, 0], spreads[q, 1] = spread(poses[q])
+        spreads[q, 0] = -1.0  # not asked for yet
     for p in range(len(pairs)):
         a, b, q, link = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
-        c = volumes.center[b]
-        motion = spreads[q, 0] + spreads[q, 1] * math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
-        if sphere_gap(volumes, a, b, poses[q, n // 2]) - (1.0 + _SLACK) * motion > limit:
+        gap, motion = sphere_gap(volumes, a, b, poses[q, n // 2]), 0.0
+        if gap > limit:
+            if spreads[q, 0] < 0.0:
+                spreads[q, 0], spreads[q, 1] = spread(poses[q])
+            c = volumes.center[b]
+            motion = spreads[q, 0] + spreads[q, 1] * math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+        if gap - (1.0 + _SLACK) * motion > limit:
             counts[BY_BLOCK] += n
             for f in range(n):
                 level[f, p], task[f, p] = 0, SKIP
@@ -166,7 +170,7 @@ def keep_all(
             task[f, p] = RUN
 
 
-@leaf_kernel
+@inlined_kernel
 def _same(a: Floats, b: Floats) -> bool:
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):

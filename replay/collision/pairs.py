@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.collision.globs import Globs
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import JointType, Linkage
@@ -101,13 +101,19 @@ class PairRules:
         self._link = np.array([body.link for body in bodies], dtype=np.int64)
         self._parent = linkage.parents
         self._rigid = _rigid_parts(linkage)
-        self._rules = [(_matching(rule.a, bodies, linkage), _matching(rule.b, bodies, linkage)) for rule in disabled]
+        globs = Globs([linkage.link_names[body.link] for body in bodies]), Globs(self.names)
+        self._sides = [tuple(_fitting(pattern, globs) for pattern in (rule.a, rule.b)) for rule in disabled]
+        self._masks, self._keys = self._left_out()
 
     def tested(self, a: Integers | int, b: Integers) -> Flags:
         """Return which of the pairs of bodies a, b (broadcast) are tested."""
         result = self._apart(a, b) & ~self._joined(a, b)
-        for x, y in self._rules:
+        for x, y in self._masks:
             result &= ~((x[a] & y[b]) | (y[a] & x[b]))
+        if len(self._keys):
+            wanted = np.minimum(a, b) * len(self.names) + np.maximum(a, b)
+            place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
+            result &= self._keys[place] != wanted
         return result
 
     def static(self, a: Integers | int, b: Integers) -> Flags:
@@ -127,11 +133,37 @@ class PairRules:
     def unmatched(self) -> tuple[DisabledPair, ...]:
         """Return the disabled pairs that match no two bodies on different links."""
         missed = []
-        for rule, (x, y) in zip(self.disabled, self._rules, strict=True):
-            links_x, links_y = set(self._link[x].tolist()), set(self._link[y].tolist())
+        for rule, (x, y) in zip(self.disabled, self._sides, strict=True):
+            links_x, links_y = set(self._link[list(x)].tolist()), set(self._link[list(y)].tolist())
             if not links_x or not links_y or (links_x == links_y and len(links_x) == 1):
                 missed.append(rule)
         return tuple(missed)
+
+    def _left_out(self) -> tuple[list[tuple[Flags, Flags]], Integers]:
+        """Return the disabled pairs as few masks (x, y), for rules of many pairs, and as sorted keys of single pairs.
+
+        Rules that share a side are one rule; what n bodies with a rule each would cost is n^2 for every body.
+        """
+        sides = {(min(rule), max(rule)) for rule in self._sides}
+        for kept in (1, 0):
+            joined: dict[tuple[int, ...], set[int]] = {}
+            for rule in sides:
+                joined.setdefault(rule[kept], set()).update(rule[1 - kept])
+            pairs = [(tuple(sorted(other)), same) for same, other in joined.items()]
+            sides = {rule if kept else rule[::-1] for rule in pairs}
+        masks, keys = [], [np.zeros(0, dtype=np.int64)]
+        for x, y in sides:
+            if len(x) * len(y) > len(self.names):
+                masks.append((self._mask(x), self._mask(y)))
+            else:
+                a, b = np.repeat(np.array(x, dtype=np.int64), len(y)), np.tile(np.array(y, dtype=np.int64), len(x))
+                keys.append(np.minimum(a, b) * len(self.names) + np.maximum(a, b))
+        return masks, np.unique(np.concatenate(keys))
+
+    def _mask(self, bodies: tuple[int, ...]) -> Flags:
+        mask = np.zeros(len(self.names), dtype=bool)
+        mask[list(bodies)] = True
+        return mask
 
     def _apart(self, a: Integers | int, b: Integers) -> Flags:
         result: Flags = self._link[a] != self._link[b]
@@ -179,11 +211,10 @@ def plan(bodies: Sequence[CollisionBody], linkage: Linkage, *, disabled: Sequenc
     return PairPlan(tuple(sorted(pairs, key=lambda pair: pair.name)), rules.unmatched())
 
 
-def _matching(pattern: str, bodies: Sequence[CollisionBody], linkage: Linkage) -> Flags:
-    """Return which bodies' names, or whose links' names, fit the glob."""
-    links = {body.link for body in bodies}
-    fitting = {link for link in links if fnmatchcase(linkage.link_names[link], pattern)}
-    return np.array([body.link in fitting or fnmatchcase(body.name, pattern) for body in bodies], dtype=bool)
+def _fitting(pattern: str, globs: tuple[Globs, Globs]) -> tuple[int, ...]:
+    """Return the bodies whose link's name, or whose own, fits the glob."""
+    by_link, by_name = (names.fitting(pattern) for names in globs)
+    return tuple(sorted({*by_link, *by_name})) if by_link and by_name else by_link or by_name
 
 
 def _rigid_parts(linkage: Linkage) -> Integers:

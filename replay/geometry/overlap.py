@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 
 Array = NDArray[np.float64]
 
 _SLACK = 64.0 * float(np.finfo(np.float64).eps)
 
 
-@kernel
+@leaf_kernel
 def spheres_meet(center_a: Array, radius_a: float, center_b: Array, radius_b: float, T_a_b: Array) -> bool:
     """Return whether two spheres meet: |c_b - c_a|^2 <= (r_a + r_b)^2, centres (3,) and radii in [m]."""
     square, size = 0.0, radius_a + radius_b
@@ -31,7 +31,7 @@ def spheres_meet(center_a: Array, radius_a: float, center_b: Array, radius_b: fl
     return square <= size * size
 
 
-@kernel
+@leaf_kernel
 def aabbs_meet(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T_a_b: Array) -> bool:
     """Return whether box a and the box around b along a's axes meet, on each axis |c_b - c_a| <= w_a + |R| w_b."""
     slack = _sizes(center_a, half_a, center_b, half_b, T_a_b)
@@ -46,7 +46,7 @@ def aabbs_meet(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T
     return True
 
 
-@kernel
+@leaf_kernel
 def obbs_meet(
     center_a: Array, half_a: Array, axes_a: Array, center_b: Array, half_b: Array, axes_b: Array, T_a_b: Array
 ) -> bool:
@@ -95,7 +95,7 @@ def obbs_meet(
 Vector = tuple[float, float, float]
 
 
-@kernel
+@inlined_kernel
 def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Array, half_b: float) -> bool:
     reach = half_b + half_a[0] * s[0] + half_a[1] * s[1] + half_a[2] * s[2]
     distance: float = abs(t[0] * r[0] + t[1] * r[1] + t[2] * r[2])
@@ -103,7 +103,7 @@ def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Array, half_b: float) -
     return apart
 
 
-@kernel
+@inlined_kernel
 def _edges_apart(
     t: Vector, r: Vector, s: Vector, s_m: Vector, s_n: Vector, half_a: Array, half_m: float, half_n: float, slack: float
 ) -> bool:
@@ -116,7 +116,7 @@ def _edges_apart(
     return False
 
 
-@kernel
+@inlined_kernel
 def _turned(axes: Array, v: Vector) -> Vector:
     return (
         axes[0, 0] * v[0] + axes[0, 1] * v[1] + axes[0, 2] * v[2],
@@ -125,7 +125,7 @@ def _turned(axes: Array, v: Vector) -> Vector:
     )
 
 
-@kernel
+@inlined_kernel
 def _column(axes_a: Array, axis_b: Array, T_a_b: Array) -> Vector:
     """Return (a_i . b) for one axis b of box b."""
     turned = (
@@ -136,7 +136,7 @@ def _column(axes_a: Array, axis_b: Array, T_a_b: Array) -> Vector:
     return _turned(axes_a, turned)
 
 
-@kernel
+@inlined_kernel
 def _sizes(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T_a_b: Array) -> float:
     """Return the slack [m]: _SLACK times all lengths that enter."""
     total = 0.0

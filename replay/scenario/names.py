@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
+from replay.collision.globs import Globs
 from replay.scenario.collision import Disable
 from replay.scenario.expectations import CapacitiveExpectation, DistanceExpectation, Expectation, PairExpectation
 from replay.scenario.fields import Part
@@ -102,11 +103,21 @@ class Names:
 
     def links_matching(self, pattern: str) -> list[str]:
         """Return the links that a pattern matches."""
-        return [link for link in self.parents if matches(pattern, link)]
+        links = tuple(self.parents)
+        return [links[place] for place in self._link_globs.fitting(pattern)]
 
     def shapes_matching(self, pattern: str) -> list[ShapeName]:
         """Return the shapes that a pattern matches, by link or by full name."""
-        return [shape for shape in self.shapes if matches(pattern, shape.link, shape.name)]
+        by_link, by_name = (globs.fitting(pattern) for globs in self._shape_globs)
+        return [self.shapes[place] for place in sorted({*by_link, *by_name})]
+
+    @cached_property
+    def _link_globs(self) -> Globs:
+        return Globs(tuple(self.parents))
+
+    @cached_property
+    def _shape_globs(self) -> tuple[Globs, Globs]:
+        return Globs([shape.link for shape in self.shapes]), Globs([shape.full for shape in self.shapes])
 
     @cached_property
     def points(self) -> dict[str, tuple[Waypoint, ...] | None]:

@@ -1,9 +1,11 @@
 """Which pairs are planned."""
 
+from fnmatch import fnmatchcase
+
 import numpy as np
 import pytest
 
-from replay.collision.pairs import CollisionBody, DisabledPair, plan, plan_pairs
+from replay.collision.pairs import CollisionBody, DisabledPair, PairRules, plan, plan_pairs
 from replay.errors import InvalidValue
 from replay.geometry.primitives import cube
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
@@ -67,6 +69,44 @@ def test_disabled_pairs_match_links_and_shapes_and_report_what_matches_nothing()
         "stand/base|table/top",
     ]
     assert planned.unmatched == (rules[2], rules[3])
+
+
+def test_many_rules_leave_out_what_each_says():
+    """Against every rule asked about every pair; rules that share sides, hold few pairs or many, or match nothing."""
+    rng = np.random.default_rng(3)
+    names = [f"{a}{k}" for a in "abc" for k in range(12)]
+    joint = JointType.FREE
+    linkage = Linkage([Link(name, None, np.identity(4), Joint(f"j{name}", joint)) for name in names])
+    several = [
+        CollisionBody(f"{name}/{shape}", linkage.link_index(name), cube(1.0)) for name in names for shape in ("s", "t")
+    ]
+    patterns = ["a*", "*", "b1?", "c[135]", "a0/*", "*/t", "b3", "b3/s", "none", "[!a]*/s", "c7/t", "a1", "a2"]
+    for _ in range(30):
+        rules = [DisabledPair(*rng.choice(patterns[2:], 2), "") for _ in range(rng.integers(0, 25))]
+        rules += [DisabledPair("a*", "a*", "")] * int(rng.integers(0, 2))
+        asked = PairRules(several, linkage, disabled=rules)
+        fits = {p: {k for k, body in enumerate(several) if fits_either(body, p)} for p in patterns}
+        missed = []
+        for rule in rules:
+            pairs = {(a, b) for a in fits[rule.a] for b in fits[rule.b] if several[a].link != several[b].link}
+            if not pairs:
+                missed.append(rule)
+        assert asked.unmatched() == tuple(missed)
+        everyone = np.arange(len(several))
+        for a in everyone:
+            expected = [
+                several[a].link != several[b].link
+                and not any(
+                    (a in fits[rule.a] and b in fits[rule.b]) or (b in fits[rule.a] and a in fits[rule.b])
+                    for rule in rules
+                )
+                for b in everyone
+            ]
+            assert asked.tested(int(a), everyone).tolist() == expected
+
+
+def fits_either(body, pattern):
+    return fnmatchcase(body.name, pattern) or fnmatchcase(body.name.split("/")[0], pattern)
 
 
 def test_names_are_unique():
