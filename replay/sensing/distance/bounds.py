@@ -14,10 +14,8 @@ Above 90 deg f is convex, hence largest on a corner. Below, f is a linear functi
 axis, whose curvature is at most 1 / (that distance), so f exceeds its largest corner value by at most
 cos h (L^2 / 3) / (2 distance), L the longest edge, and by at most the way to the nearest corner, L / sqrt 3.
 
-Triangle, distance. With any vector s and any w = s + k g, k >= 0, the points x of the triangle in the cone have
-  |x| |w| >= x · w = x · s + k x · g >= min c_i · s,   hence   |x| >= min c_i · s / |w|,
-whatever rounding did to s. It is tight when w is the closest point of the triangle in the half space g · x >= 0, and
-s the way to it from k g. That k puts the closest point of the triangle's plane on the border of the half space.
+Triangle, distance. For any vector s, every point x of the triangle has |x| |s| >= x · s >= min c_i · s. With s the
+closest point of the triangle this is the distance to it, and it is a bound whatever rounding did to s.
 """
 
 from __future__ import annotations
@@ -35,8 +33,7 @@ from replay.sensing.distance.vectors import Vector
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-_STEEP = 0.01
-"""Least part 1 - (n · g)^2 that k is divided by: a smaller one makes k large and loses digits."""
+_THIRD = 1.0 / 3.0
 
 X, Y, Z = LANES * CENTRE, LANES * (CENTRE + 1), LANES * (CENTRE + 2)
 E, H = LANES * AXES, LANES * HALVES
@@ -94,7 +91,6 @@ def triangle_bounds(corners: Floats, apex: Vector, cone: Cone, slack: float, bou
     """
     cos_half, sin_half = cone.cos_half, cone.sin_half
     vx, vy, vz = cone.vx, cone.vy, cone.vz
-    convex = cos_half > 0.0
     for lane in range(len(bounds)):
         ax, ay, az = (
             corners[lane] - apex[0],
@@ -117,7 +113,7 @@ def triangle_bounds(corners: Floats, apex: Vector, cone: Cone, slack: float, bou
         uu, ww, tt = ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz, tx * tx + ty * ty + tz * tz
 
         # Cone
-        sag = max(max(uu, ww), tt) / 3.0
+        sag = max(max(uu, ww), tt) * _THIRD
         reach = math.sqrt(sag)
         along_a, along_b, along_c = (
             ax * vx + ay * vy + az * vz,
@@ -138,43 +134,28 @@ def triangle_bounds(corners: Floats, apex: Vector, cone: Cone, slack: float, bou
         bent = (free > 0.0) & (outside * free > 0.5 * sag * cos_half)
         missed = (outside > 0.0) & ((outside > reach) | bent | (cos_half <= 0.0))
 
-        # g for the direction of the centroid, and k
+        # Distance: s is the closest point of the triangle, on an edge or inside
         nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
         nn = nx * nx + ny * ny + nz * nz
-        along = (along_a + along_b + along_c) / 3.0
-        rx, ry, rz = (ax + bx + cx) / 3.0 - along * vx, (ay + by + cy) / 3.0 - along * vy, (az + bz + cz) / 3.0 - along * vz
-        along = rx * vx + ry * vy + rz * vz  # of rounding
-        rx, ry, rz = rx - along * vx, ry - along * vy, rz - along * vz
-        part = cos_half / math.sqrt(rx * rx + ry * ry + rz * rz)
-        gx, gy, gz = sin_half * vx - part * rx, sin_half * vy - part * ry, sin_half * vz - part * rz
-        ng = nx * gx + ny * gy + nz * gz
-        k = -(nx * ax + ny * ay + nz * az) * ng / max(nn - ng * ng, _STEEP * nn)
-        k = k if convex & (k > 0.0) else 0.0
-        px, py, pz = (k * gx, k * gy, k * gz) if k > 0.0 else (0.0, 0.0, 0.0)
-
-        # s: from k g to the closest point of the triangle
-        dx, dy, dz = ax - px, ay - py, az - pz
-        t = min(max(-(dx * ux + dy * uy + dz * uz) / uu, 0.0), 1.0) if uu > 0.0 else 0.0
-        sx, sy, sz = dx + t * ux, dy + t * uy, dz + t * uz
+        height = (nx * ax + ny * ay + nz * az) / nn
+        inner_u = nx * (uy * az - uz * ay) + ny * (uz * ax - ux * az) + nz * (ux * ay - uy * ax) <= 0.0
+        inner_w = nx * (wy * bz - wz * by) + ny * (wz * bx - wx * bz) + nz * (wx * by - wy * bx) <= 0.0
+        inner_t = nx * (ty * cz - tz * cy) + ny * (tz * cx - tx * cz) + nz * (tx * cy - ty * cx) <= 0.0
+        at = min(max(-(ax * ux + ay * uy + az * uz) / uu, 0.0), 1.0) if uu > 0.0 else 0.0
+        sx, sy, sz = ax + at * ux, ay + at * uy, az + at * uz
         ss = sx * sx + sy * sy + sz * sz
-        inner = nx * (uy * dz - uz * dy) + ny * (uz * dx - ux * dz) + nz * (ux * dy - uy * dx) <= 0.0
-        height = (nx * dx + ny * dy + nz * dz) / nn
-        dx, dy, dz = bx - px, by - py, bz - pz
-        inner &= nx * (wy * dz - wz * dy) + ny * (wz * dx - wx * dz) + nz * (wx * dy - wy * dx) <= 0.0
-        t = min(max(-(dx * wx + dy * wy + dz * wz) / ww, 0.0), 1.0) if ww > 0.0 else 0.0
-        dx, dy, dz = dx + t * wx, dy + t * wy, dz + t * wz
-        dd = dx * dx + dy * dy + dz * dz
-        sx, sy, sz, ss = (dx, dy, dz, dd) if dd < ss else (sx, sy, sz, ss)
-        dx, dy, dz = cx - px, cy - py, cz - pz
-        inner &= nx * (ty * dz - tz * dy) + ny * (tz * dx - tx * dz) + nz * (tx * dy - ty * dx) <= 0.0
-        t = min(max(-(dx * tx + dy * ty + dz * tz) / tt, 0.0), 1.0) if tt > 0.0 else 0.0
-        dx, dy, dz = dx + t * tx, dy + t * ty, dz + t * tz
-        dd = dx * dx + dy * dy + dz * dz
-        sx, sy, sz = (dx, dy, dz) if dd < ss else (sx, sy, sz)
-        sx, sy, sz = (height * nx, height * ny, height * nz) if inner & (nn > 0.0) else (sx, sy, sz)
-
-        qx, qy, qz = sx + px, sy + py, sz + pz
+        at = min(max(-(bx * wx + by * wy + bz * wz) / ww, 0.0), 1.0) if ww > 0.0 else 0.0
+        qx, qy, qz = bx + at * wx, by + at * wy, bz + at * wz
+        qq = qx * qx + qy * qy + qz * qz
+        nearer = qq < ss
+        sx, sy, sz, ss = qx if nearer else sx, qy if nearer else sy, qz if nearer else sz, qq if nearer else ss
+        at = min(max(-(cx * tx + cy * ty + cz * tz) / tt, 0.0), 1.0) if tt > 0.0 else 0.0
+        qx, qy, qz = cx + at * tx, cy + at * ty, cz + at * tz
+        nearer = qx * qx + qy * qy + qz * qz < ss
+        sx, sy, sz = qx if nearer else sx, qy if nearer else sy, qz if nearer else sz
+        inner = inner_u & inner_w & inner_t & (nn > 0.0)
+        sx, sy, sz = height * nx if inner else sx, height * ny if inner else sy, height * nz if inner else sz
         least = min(min(ax * sx + ay * sy + az * sz, bx * sx + by * sy + bz * sz), cx * sx + cy * sy + cz * sz)
-        least = max(least - k * slack, 0.0)
-        near = least / (qx * qx + qy * qy + qz * qz) * least
+        least = max(least, 0.0)
+        near = least / (sx * sx + sy * sy + sz * sz) * least
         bounds[lane] = np.inf if missed else (near if near >= 0.0 else 0.0)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.sensing.columns import DistanceColumns
@@ -127,6 +128,7 @@ class DistanceSuite:
 
     def _sweeper(self, engine: str) -> Sweep:
         if self.method == "exact":
+            self._trees = [widen(target.tree, target.triangles) for target in self.targets]
             return self._exact
         if self.method == "thesis":
             return self._thesis
@@ -146,7 +148,7 @@ class DistanceSuite:
     def _exact(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
         target = self.targets[index]
         cos_half, sin_half = half_angle(sensor.aperture)
-        sweep_exact(target.triangles, target.tree, pose, cos_half, sin_half, sensor.range, index, nearest)
+        sweep_exact(target.triangles, self._trees[index], pose, cos_half, sin_half, sensor.range, index, nearest)
 
     def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
         cos_half = math.cos(0.5 * sensor.aperture)
