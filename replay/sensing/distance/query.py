@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from replay.geometry.wide_tree import LANES, WideTree
 from replay.numerics.jit import kernel
-from replay.sensing.distance.bounds import box_bounds, triangle_bounds
+from replay.sensing.distance.bounds import box_bounds, corner_from, triangle_bounds
 from replay.sensing.distance.cone import EPSILON, TOUCH, Cone
 from replay.sensing.distance.triangle import closest_on_triangle
 from replay.sensing.distance.vectors import Vector
@@ -60,20 +60,10 @@ def closest_of_all(triangles: Array, apex: Vector, cone: Cone, reach: float) -> 
 @kernel
 def _on_leaf(corners: Array, lane: int, apex: Vector, cone: Cone) -> tuple[float, Vector, int]:
     """As `on_triangle`, for one triangle of a leaf."""
-    a = (
-        corners[lane] - apex[0],
-        corners[LANES + lane] - apex[1],
-        corners[2 * LANES + lane] - apex[2],
-    )
-    b = (
-        corners[3 * LANES + lane] - apex[0],
-        corners[4 * LANES + lane] - apex[1],
-        corners[5 * LANES + lane] - apex[2],
-    )
-    c = (
-        corners[6 * LANES + lane] - apex[0],
-        corners[7 * LANES + lane] - apex[1],
-        corners[8 * LANES + lane] - apex[2],
+    a, b, c = (
+        corner_from(apex, corners, 0, lane),
+        corner_from(apex, corners, 1, lane),
+        corner_from(apex, corners, 2, lane),
     )
     return closest_on_triangle(a, b, c, cone)
 
@@ -148,7 +138,7 @@ def closest_in_tree(
             if bounds[nearest] > squared:
                 break
             bounds[nearest] = np.inf
-            k = tree.index[leaf, nearest]
+            k = tree.indices[leaf, nearest]
             if k < 0 or k == start:
                 continue
             distance, x, which = _on_leaf(tree.corners[leaf], nearest, apex, cone)

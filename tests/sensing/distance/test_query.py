@@ -45,7 +45,11 @@ MESHES = {
     "cubes": lambda rng: grid_of_cubes(4),
     "soup": soup,
     "far": lambda rng: torus(20, 12) * 0.1 + [1e6, -2e5, 3e5],
+    "fine": lambda rng: torus(120, 50),
     "one": lambda rng: rng.normal(size=(1, 3, 3)),
+    "two": lambda rng: rng.normal(size=(2, 3, 3)),
+    "a leaf": lambda rng: rng.normal(size=(LANES, 3, 3)),
+    "a leaf and one": lambda rng: rng.normal(size=(LANES + 1, 3, 3)),
 }
 
 
