@@ -58,10 +58,14 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.comparison.rules_file
 	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
 
-pictures: setup system  ## render the README's pictures from the recordings that `make run` left
+pictures: $(VENV)/.test system  ## make the README's pictures, two of them from the recordings that `make run` left
 	mkdir -p scenarios/pictures
 	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.6
 	$(BIN)/replay view $(RECORDINGS)/carm_parking/carm_parking.rrd --screenshot scenarios/pictures/carm_parking.png --at 4.2
+	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.thesis --model thesis2015 --no-rrd --overwrite
+	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.ours --no-rrd --overwrite
+	$(BIN)/replay diff $(RECORDINGS)/.thesis $(RECORDINGS)/.ours --rules scenarios/rules.yaml --html $(RECORDINGS)/.html || test $$? = 1
+	$(BIN)/python -m tests.pictures $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/thesis_and_ours.png
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak

@@ -104,6 +104,10 @@ class WriteError(ReplayError):
         super().__init__(f"{file}: cannot be written: {reason}")
 
 
+class NoSpaceError(WriteError):
+    """A file cannot be written because no room is left, which ends everything that writes there."""
+
+
 class WorkerError(ReplayError):
     """Worker processes cannot be used: they die before they have begun."""
 

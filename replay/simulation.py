@@ -66,10 +66,10 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene) -> None:
-        from replay.kinematics.motion import sample
+        from replay.kinematics.motion import plan
 
         self.scene = scene
-        self._states = sample(scene.linkage, scene.script, scene.seconds(0, scene.frames))
+        self._motion = plan(scene.linkage, scene.script)
         self.collision = _collision(scene)
         self.distance = _distance(scene)
         self.capacitive = _capacitive(scene)
@@ -77,14 +77,14 @@ class Simulation:
     def block(self, first: int) -> FrameBlock:
         """Return the block that begins at a frame; it depends on no other block."""
         last = min(first + BLOCK_FRAMES, self.scene.frames)
-        states = self._states
-        poses = self.scene.linkage.forward(states.positions[first:last], states.free_poses[first:last])
+        states = self._motion.states(self.scene.seconds(first, last))
+        poses = self.scene.linkage.forward(states.positions, states.free_poses)
         return FrameBlock(
             layout=self.scene.layout,
             first=first,
             time=self.scene.time_ns(first, last),
-            joint_positions=states.positions[first:last],
-            joint_velocities=states.velocities[first:last],
+            joint_positions=states.positions,
+            joint_velocities=states.velocities,
             link_poses=poses.world,
             collision=self.collision.run(poses) if self.collision else None,
             distance=self.distance.run(poses) if self.distance else None,

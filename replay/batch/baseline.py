@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from replay.errors import WriteError
 from replay.logs.mcap_reader import McapLog
+from replay.logs.part_file import write_error
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, write_slim
 
@@ -56,7 +56,7 @@ class Baseline:
             self.directory.mkdir(parents=True, exist_ok=True)
             staging = Path(tempfile.mkdtemp(prefix=".staging-", dir=self.directory))
         except OSError as error:
-            raise WriteError(str(self.directory), error.strerror or str(error)) from None
+            raise write_error(self.directory, error) from None
         try:
             staged: dict[str, Path] = {}
             codes: set[str] = set()
@@ -77,7 +77,7 @@ class Baseline:
             with (self.directory / LOG).open("a", encoding="utf-8") as log_file:
                 log_file.write(json.dumps(line, ensure_ascii=False) + "\n")
         except OSError as error:
-            raise WriteError(str(self.directory), error.strerror or str(error)) from None
+            raise write_error(self.directory, error) from None
         finally:
             shutil.rmtree(staging, ignore_errors=True)
         self._remove_unneeded()

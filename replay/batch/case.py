@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from replay.errors import ReplayError
+from replay.errors import ReplayError, ScenarioError
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.verdict import ExpectationCheck, Outcome
 
@@ -65,6 +65,7 @@ class CaseResult:
         outcomes: what became of each expectation.
         recordings: where they are; None when there are none.
         error: the one line that says why there are none; "" when there are.
+        invalid: the scenario itself is at fault: a mesh cannot be used, or no scene can be built of it.
         counters: what the collision pipeline did, by counter.
         seconds: wall time.
         memory: the most resident memory seen [bytes].
@@ -78,6 +79,7 @@ class CaseResult:
     outcomes: tuple[Outcome, ...] = ()
     recordings: RecordedPaths | None = None
     error: str = ""
+    invalid: bool = False
     counters: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     memory: int = 0
@@ -131,7 +133,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
-        return CaseResult(scenario.name, Status.FAILED, error=str(error), seconds=seconds)
+        invalid = isinstance(error, ScenarioError)
+        return CaseResult(scenario.name, Status.FAILED, error=str(error), invalid=invalid, seconds=seconds)
     outcomes = tuple(check.finish())
     return CaseResult(
         scenario.name,

@@ -1,7 +1,8 @@
 """Scenarios on a Dask cluster: inputs travel with the task, files come back with the result.
 
 Each scenario runs in a worker process of its own on the machine that takes it, so that a crash, a hang or a lack of
-memory ends that process and not the cluster's. A task whose machine goes away is given to another one by Dask.
+memory ends that process and not the cluster's. A task whose machine goes away is given to another one by Dask. When
+nobody waits for a task any more, because its run was ended, its process is ended too.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import contextlib
 import dataclasses
 import tempfile
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import as_completed
+from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,11 @@ from typing import Any
 from replay.batch.case import CaseOrder, CaseResult
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.worker import Prepare, Work
-from replay.errors import MissingPackageError, WorkerError, WriteError
+from replay.errors import MissingPackageError, NoSpaceError, WorkerError, WriteError
+from replay.logs.part_file import write_file
 
 _SECONDS_TO_CONNECT = 30
+_SECONDS_BETWEEN_CHECKS = 0.1
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Cluster:
         timeout, memory: limits of one task, as of `Pool`.
         prepare: called before the task, in the process that runs it.
         follow: called with (name, 0, 0) when a task is handed over.
+        check: called about ten times a second; what it raises ends the run.
     """
 
     def __init__(
@@ -51,10 +55,12 @@ class Cluster:
         memory: int | None = None,
         prepare: Prepare | None = None,
         follow: Callable[[str, int, int], None] = lambda name, done, total: None,
+        check: Callable[[], None] = lambda: None,
     ) -> None:
         self._address = address
         self._settings: dict[str, Any] = {"work": work, "timeout": timeout, "memory": memory, "prepare": prepare}
         self._follow = follow
+        self._check = check
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -62,7 +68,7 @@ class Cluster:
         Raises:
             MissingPackageError: `distributed` is not installed.
             WorkerError: the scheduler does not answer.
-            WriteError: a file that came back cannot be written.
+            NoSpaceError: the disk is too full for a file that came back.
         """
         try:
             from distributed import Client
@@ -72,17 +78,21 @@ class Cluster:
             client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise WorkerError(f"the Dask scheduler {self._address} does not answer ({error})") from None
-        with contextlib.closing(client), client.get_executor(pure=False) as executor:
+        with contextlib.closing(client):
+            executor = client.get_executor(pure=False)
             ordered = sorted(tasks, key=lambda task: (-task.cost, task.name))
-            futures = {executor.submit(run_remotely, task, self._settings): task for task in ordered}
-            for task in ordered:
-                self._follow(task.name, 0, 0)
             try:
-                for future in as_completed(futures):
-                    yield _unpacked(futures[future], future)
+                futures = {executor.submit(run_remotely, task, self._settings): task for task in ordered}
+                for task in ordered:
+                    self._follow(task.name, 0, 0)
+                waiting = set(futures)
+                while waiting:
+                    self._check()
+                    done, waiting = wait(waiting, _SECONDS_BETWEEN_CHECKS, FIRST_COMPLETED)
+                    for future in done:
+                        yield _unpacked(futures[future], future)
             finally:
-                for future in futures:
-                    future.cancel()
+                executor.shutdown(wait=False)  # cancels what is not done; to wait for it would be to wait for a hang
 
 
 def run_remotely(task: Task, settings: dict[str, Any]) -> Parcel:
@@ -90,9 +100,28 @@ def run_remotely(task: Task, settings: dict[str, Any]) -> Parcel:
     with tempfile.TemporaryDirectory(prefix="replay-") as name:
         folder = Path(name)
         order: CaseOrder = dataclasses.replace(task.payload, folder=folder)
-        (ended,) = Pool(workers=1, **settings).run([dataclasses.replace(task, payload=order, log=folder / "log.txt")])
+        pool = Pool(workers=1, check=_until_unwanted(), **settings)
+        (ended,) = pool.run([dataclasses.replace(task, payload=order, log=folder / "log.txt")])
         files = {file.name: file.read_bytes() for file in folder.iterdir() if not file.name.endswith(".part")}
     return Parcel(dataclasses.replace(ended, task=dataclasses.replace(task, payload=None)), files)
+
+
+def _until_unwanted() -> Callable[[], None]:
+    """Return what raises CancelledError once the scheduler has released the Dask task that this is called in.
+
+    Dask does not stop a task that runs; its worker only notes that the result will not be used.
+    """
+    from distributed import get_worker
+
+    worker: Any = get_worker()
+    key = worker.get_current_task()
+
+    def check() -> None:
+        task = worker.state.tasks.get(key)
+        if task is None or task.state == "cancelled":
+            raise CancelledError
+
+    return check
 
 
 def _unpacked(task: Task, future: Any) -> Ended:
@@ -102,11 +131,13 @@ def _unpacked(task: Task, future: Any) -> Ended:
     except Exception as error:  # the machine that ran it is gone too often, or replay is not installed there
         return Ended(task, Ending.CRASHED, None, f"crashed: on the cluster: {error}", 0.0, 0)
     folder = task.payload.folder
-    for name, data in parcel.files.items():
-        try:
-            (folder / name).write_bytes(data)
-        except OSError as error:
-            raise WriteError(str(folder / name), error.strerror or str(error)) from None
+    try:
+        for name, data in parcel.files.items():
+            write_file(folder / name, data)
+    except NoSpaceError:
+        raise
+    except WriteError as error:
+        return Ended(task, Ending.CRASHED, None, str(error), parcel.ended.seconds, parcel.ended.memory)
     value = parcel.ended.value
     if isinstance(value, CaseResult) and value.recordings is not None:
         found = value.recordings

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.errors import WriteError
+from replay.logs.part_file import write_error
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def append_night(path: Path, night: Night) -> None:
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry, ensure_ascii=False) + "\n")
     except OSError as error:
-        raise WriteError(str(path), error.strerror or str(error)) from None
+        raise write_error(path, error) from None
 
 
 def failing_since(nights: list[Night], name: str) -> str | None:

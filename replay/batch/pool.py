@@ -95,6 +95,7 @@ class Pool:
         prepare: called in each worker before its first task.
         follow: called with the name of a task, what is done of it and all of it; (name, 0, 0) when it begins.
         tell: called with remarks for the user.
+        check: called all the time, at least about ten times a second; what it raises ends the run and all processes.
 
     Raises:
         InvalidValue: a limit or the number of workers is not positive.
@@ -110,6 +111,7 @@ class Pool:
         prepare: Prepare | None = None,
         follow: Callable[[str, int, int], None] = lambda name, done, total: None,
         tell: Callable[[str], None] = lambda text: None,
+        check: Callable[[], None] = lambda: None,
     ) -> None:
         for name, value in (("workers", workers), ("timeout", timeout), ("memory", memory)):
             if value is not None and value <= 0:
@@ -120,6 +122,7 @@ class Pool:
         self._memory = memory
         self._follow = follow
         self._tell = tell
+        self._check = check
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -135,6 +138,7 @@ class Pool:
         next_check = 0.0
         try:
             while waiting or any(worker.task for worker in workers):
+                self._check()
                 wanted = min(self._count, len(waiting) + sum(worker.task is not None for worker in workers))
                 while len(workers) < (wanted if prepared else 1):
                     workers.append(_Worker(self._start, inbox))

@@ -31,6 +31,7 @@ links:
   guest:
     joint: {type: free}
     shapes: {body: {type: sphere, radius: 0.3, chord_error: 0.2 mm}}
+  corner: {shapes: {SHAPES}}
 motion:
   points: {bow: [{time: 0, position: -1}, {time: 0.9, position: 1}]}
   moves: [{to: {tool: 0.5}, speed: 1}]
@@ -39,7 +40,16 @@ collision: {pairs: PAIRS, margin: 0.2}
 sensors: {SENSORS}
 """
 _DISTANCE = "distance: {eye: {link: tool, pose: {rpy: [3.1, 0, 0]}, aperture: 1, range: 3}}"
+_MESH = "walls: {type: mesh, file: corner.obj, scale: 1, pose: {xyz: [-0.5, -2.5, -0.5]}}"
 _CAPACITIVE = "capacitive: {guard: {link: tool, plates: {a: {size: [0.1, 0.1]}}, coupling: 10 pF}}"
+
+_CORNER = b"""
+v 0 0 0\nv 4 0 0\nv 4 1 0\nv 1 1 0\nv 1 4 0\nv 0 4 0
+v 0 0 1\nv 4 0 1\nv 4 1 1\nv 1 1 1\nv 1 4 1\nv 0 4 1
+f 4 2 1\nf 4 3 2\nf 4 1 6\nf 4 6 5\nf 7 8 10\nf 8 9 10\nf 7 10 12\nf 10 11 12
+f 1 2 8\nf 1 8 7\nf 2 3 9\nf 2 9 8\nf 3 4 10\nf 3 10 9\nf 4 5 11\nf 4 11 10\nf 5 6 12\nf 5 12 11\nf 6 1 7\nf 6 7 12
+"""
+"""A closed body like the letter L: what is between its legs is within its hull, and not within the body."""
 
 
 @dataclass(frozen=True)
@@ -50,19 +60,22 @@ class Needs:
     collision: bool
     distance: bool
     capacitive: bool
+    meshes: bool
 
 
 def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs, ...]:
     """Return what scenarios need, each combination once."""
-    found = {
-        (scenario.collision.pairs == "all", bool(scenario.sensors.distance), bool(scenario.sensors.capacitive), name): (
-            version
+    needs = (
+        Needs(
+            model or scenario.model,
+            collision=scenario.collision.pairs == "all",
+            distance=bool(scenario.sensors.distance),
+            capacitive=bool(scenario.sensors.capacitive),
+            meshes=bool(scenario.provenance.meshes),
         )
         for scenario in scenarios
-        for version in [model or scenario.model]
-        for name in [version.model_dump_json()]
-    }
-    return tuple(Needs(version, *parts) for (*parts, _), version in found.items())
+    )
+    return tuple(dict.fromkeys(needs))
 
 
 @dataclass(frozen=True)
@@ -79,17 +92,17 @@ class PrepareKernels:
 
     def __call__(self, tell: Callable[[str], None]) -> None:
         """Run the small scene with each combination of methods."""
-        from replay.numerics.jit import is_cache_empty
+        from replay.numerics.announcement import announce_by
         from replay.scenario.load import load_sources
         from replay.simulation import simulate
 
-        if is_cache_empty():
-            tell("compiling kernels; this takes about a minute, once")
+        announce_by(tell)
         for needs in self.needs:
             sensors = [text for text, used in ((_DISTANCE, needs.distance), (_CAPACITIVE, needs.capacitive)) if used]
             text = _SCENE.replace(b"PAIRS", b"all" if needs.collision else b"none")
             text = text.replace(b"{SENSORS}", f"{{{', '.join(sensors)}}}".encode())
-            scenario = load_sources("prepare.yaml", {"prepare.yaml": text})
+            text = text.replace(b"{SHAPES}", f"{{{_MESH if needs.meshes else ''}}}".encode())
+            scenario = load_sources("prepare.yaml", {"prepare.yaml": text, "corner.obj": _CORNER})
             for _ in simulate(scenario, model=needs.model):
                 pass
         if self.rrd:

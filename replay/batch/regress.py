@@ -2,106 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import datetime
-import enum
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from replay.batch.baseline import Baseline, Entry
 from replay.batch.case import CaseResult, Status
-from replay.batch.run import Execution, Run, Watch, run_all
+from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, Verdict
+from replay.batch.run import Execution, Run, run_all
 from replay.batch.select import Selection
+from replay.batch.watch import Unwatched, Watch
 from replay.comparison import wording
 from replay.comparison.difference import Verdict as DiffVerdict
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.rules import Rules
-from replay.comparison.runs import Case, diff_pair, read_pair
-from replay.errors import RecordingError
+from replay.comparison.runs import Case, Pair, diff_pair, read_pair
+from replay.errors import NoSpaceError, RecordingError, WriteError
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
 MissingBaseline = Literal["fail", "create", "skip"]
 Rrd = Literal["failing", "all", "none"]
-
-
-class Verdict(enum.Enum):
-    """What the regression says of a scenario."""
-
-    SAME = "same"
-    CREATED = "created"  # it had no baseline, and has one now
-    DIFFERENT = "different"
-    BROKEN = "broken"  # an expectation does not hold
-    FAILED = "failed"
-    CRASHED = "crashed"
-    TIMEOUT = "timeout"
-    MEMORY = "memory"
-    INTERRUPTED = "interrupted"
-    MISSING = "missing baseline"
-    UNREADABLE = "unreadable baseline"
-    UNCOMPARED = "no baseline"  # and that is accepted
-    SKIPPED = "skipped"
-
-    @property
-    def fine(self) -> bool:
-        """Whether there is nothing to be done about it."""
-        return self in (Verdict.SAME, Verdict.CREATED, Verdict.UNCOMPARED, Verdict.SKIPPED)
-
-    @property
-    def left_out(self) -> bool:
-        """Whether it says nothing about the scenario's results."""
-        return self in (Verdict.UNCOMPARED, Verdict.SKIPPED)
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """A scenario and what is said of it.
-
-    Attributes:
-        name: of the scenario.
-        verdict: what became of it.
-        message: one line that says why; "" when it is the same.
-        result: of its run; None when it was skipped.
-        comparison: with its baseline; None when there was none to make.
-        drawings: of its signals that differ.
-        source: file that it was read from, as the user named it; "" when that is not known.
-    """
-
-    name: str
-    verdict: Verdict
-    message: str = ""
-    result: CaseResult | None = None
-    comparison: Case | None = None
-    drawings: tuple[Plot, ...] = ()
-    source: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Regression:
-    """A run with its verdicts.
-
-    Attributes:
-        run: what was run.
-        baseline: folder.
-        rules: file of tolerances; "" for none.
-        model: file or name of the model that replaces the scenarios' own; "" for none.
-        judged: all scenarios, in the order in which they were given, and then those that were skipped.
-        unused: scenarios that have a baseline and were not among those given.
-    """
-
-    run: Run
-    baseline: Path
-    rules: str
-    model: str
-    judged: tuple[Judged, ...]
-    unused: tuple[str, ...]
-
-    def count(self, *verdicts: Verdict) -> int:
-        """Return how many scenarios have one of some verdicts."""
-        return sum(item.verdict in verdicts for item in self.judged)
 
 
 def regress(
@@ -136,7 +62,8 @@ def regress(
         WriteError: a folder cannot be written.
         WorkerError: worker processes cannot be started.
     """
-    accepted = Baseline(baseline)
+    accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
+    _forget(directory, [scenario.name for scenario in selection.chosen])
     run = run_all(
         selection.chosen,
         directory,
@@ -146,21 +73,65 @@ def regress(
         execution=execution,
         watch=watch,
     )
-    judged = []
-    for scenario, result in zip(selection.chosen, run.results, strict=True):
-        overlay = directory / scenario.name / f"{scenario.name}.difference.rrd"
-        overlay.unlink(missing_ok=True)
-        judged.append(_judge(scenario, result, accepted, rules or Rules(), missing, None if rrd == "none" else overlay))
-    created = {j.name: Entry(_mcap(j), "new") for j in judged if j.verdict is Verdict.CREATED}
-    if created:
-        reason = "created by regress --missing-baseline create"
-        accepted.store(created, reason=reason, now=datetime.datetime.now(datetime.UTC))
-    if rrd == "failing" and not run.interrupted:
-        failing = {j.name for j in judged if not j.verdict.fine and j.result and j.result.status.recorded}
-        _show(selection.chosen, failing, run, model=model, execution=execution)
-    judged += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
-    unused = sorted(set(accepted.names()) - {item.name for item in judged})
-    return Regression(run, baseline, rules_file, model_name, tuple(judged), tuple(unused))
+    if run.interrupted:
+        watch = Unwatched()  # it has told its request; another one ends the comparison too
+    judged: dict[str, Judged] = {}
+    try:
+        for scenario, result in zip(selection.chosen, run.results, strict=True):
+            watch.compare(scenario.name)
+            judged[scenario.name] = _judge(scenario, result, accepted, rules, missing, overlay=rrd != "none")
+        judged |= _created(judged, accepted)
+        if rrd == "failing" and not run.interrupted:
+            failing = {j.name for j in judged.values() if not j.verdict.fine and j.result and j.result.status.recorded}
+            _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
+    except KeyboardInterrupt:
+        run = dataclasses.replace(run, interrupted=True)
+    for name in [name for name, item in judged.items() if item.verdict is Verdict.CREATED]:
+        if accepted.recording(name) is None:
+            del judged[name]
+    ended = [
+        judged.get(scenario.name) or _unjudged(scenario, result)
+        for scenario, result in zip(selection.chosen, run.results, strict=True)
+    ]
+    ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
+    unused = sorted(set(accepted.names()) - {item.name for item in ended})
+    return Regression(run, baseline, rules_file, model_name, tuple(ended), tuple(unused))
+
+
+def _forget(directory: Path, names: Sequence[str]) -> None:
+    """Remove an earlier night's reports and pictures, which would stand beside recordings of this one."""
+    shown = [directory / name / kind.format(name=name) for name in names for kind in ("{name}.rrd", OVERLAY)]
+    for file in (directory / JUNIT, directory / INDEX, *shown):
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
+
+
+def _unjudged(scenario: Scenario, result: CaseResult) -> Judged:
+    """Return the verdict of a scenario that has not been compared, because it failed or the run was ended."""
+    if result.status.recorded:
+        message = "the run was ended before it was compared"
+        return Judged(scenario.name, Verdict.INTERRUPTED, message, result, source=_source(scenario))
+    return Judged(scenario.name, Verdict(result.status.value), result.error, result, source=_source(scenario))
+
+
+def _source(scenario: Scenario) -> str:
+    return scenario.main_source if scenario.provenance.root is None else scenario.provenance.root.place.file
+
+
+def _created(judged: Mapping[str, Judged], accepted: Baseline) -> dict[str, Judged]:
+    """Store the baselines that are to be created; return the scenarios whose baseline cannot be."""
+    created = {name: Entry(_mcap(item), "new") for name, item in judged.items() if item.verdict is Verdict.CREATED}
+    try:
+        if created:
+            reason = "created by regress --missing-baseline create"
+            accepted.store(created, reason=reason, now=datetime.datetime.now(datetime.UTC))
+    except NoSpaceError:
+        raise
+    except WriteError as error:
+        return {
+            name: dataclasses.replace(judged[name], verdict=Verdict.MISSING, message=str(error)) for name in created
+        }
+    return {}
 
 
 def _judge(
@@ -169,11 +140,11 @@ def _judge(
     baseline: Baseline,
     rules: Rules,
     missing: MissingBaseline,
-    overlay: Path | None,
+    *,
+    overlay: bool,
 ) -> Judged:
-    source = scenario.main_source if scenario.provenance.root is None else scenario.provenance.root.place.file
     if not result.status.recorded or result.recordings is None:
-        return Judged(scenario.name, Verdict(result.status.value), result.error, result, source=source)
+        return _unjudged(scenario, result)
     accepted = baseline.recording(scenario.name)
     verdict, message = Verdict.SAME, ""
     comparison: Case | None = None
@@ -186,7 +157,7 @@ def _judge(
         }[missing]
     else:
         try:
-            pair = read_pair(accepted, result.recordings.mcap)
+            pair = read_pair(accepted, result.recordings.mcap, rules=rules)
         except RecordingError as error:
             verdict, message = Verdict.UNREADABLE, str(error)
         else:
@@ -194,27 +165,59 @@ def _judge(
             comparison = Case(scenario.name, accepted, result.recordings.mcap, found)
             if found.verdict is DiffVerdict.DIFFERENT:
                 verdict, message, drawings = Verdict.DIFFERENT, wording.summary(found), plots(found, pair)
-                if overlay is not None:
-                    write_overlay(overlay, comparison, pair)
+                if overlay:
+                    message += _overlay(result.recordings.mcap.parent, comparison, pair)
     if result.status is Status.BROKEN and verdict is not Verdict.UNREADABLE:
         broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
         verdict, message = Verdict.BROKEN, "; ".join([*broken, *([message] if message else [])])
-    return Judged(scenario.name, verdict, message, result, comparison, drawings, source)
+    return Judged(scenario.name, verdict, message, result, comparison, drawings, _source(scenario))
+
+
+def _overlay(folder: Path, comparison: Case, pair: Pair) -> str:
+    """Write the recording that shows both runs; return what to add to the message when that is not possible."""
+    try:
+        write_overlay(folder / OVERLAY.format(name=comparison.name), comparison, pair)
+    except NoSpaceError:
+        raise
+    except WriteError as error:
+        return f"; {error}"
+    return ""
+
+
+class _Asked(Unwatched):
+    """Follows nothing, but passes on that the run is to end."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.check = watch.check  # type: ignore[method-assign]
 
 
 def _show(
-    scenarios: Sequence[Scenario], failing: set[str], run: Run, *, model: Model | None, execution: Execution | None
+    scenarios: Sequence[Scenario],
+    failing: set[str],
+    run: Run,
+    *,
+    model: Model | None,
+    execution: Execution | None,
+    watch: Watch,
 ) -> None:
-    """Record the failing scenarios once more, for eyes; the first recordings and what is said of them stay."""
+    """Record the failing scenarios once more, for eyes; the first recordings and what is said of them stay.
+
+    Raises:
+        KeyboardInterrupt: it was ended.
+    """
     again = run.directory / ".rrd"
     try:
         chosen = [scenario for scenario in scenarios if scenario.name in failing]
-        if chosen:
-            run_all(chosen, again, model=model, overwrite=True, execution=execution)
+        if not chosen:
+            return
+        watch.tell(f"recording {wording.count(len(chosen), 'scenario')} once more, for eyes (--rrd none leaves it out)")
+        if run_all(chosen, again, model=model, overwrite=True, execution=execution, watch=_Asked(watch)).interrupted:
+            raise KeyboardInterrupt
         for name in failing:
             file = again / name / f"{name}.rrd"
             if file.is_file():
-                file.replace(run.directory / name / file.name)
+                with contextlib.suppress(OSError):  # a folder that cannot be written has been told of
+                    file.replace(run.directory / name / file.name)
     finally:
         shutil.rmtree(again, ignore_errors=True)
 
@@ -223,8 +226,3 @@ def _mcap(item: Judged) -> Path:
     assert item.result is not None
     assert item.result.recordings is not None
     return item.result.recordings.mcap
-
-
-def verdicts(found: Regression) -> Mapping[str, str]:
-    """Return each scenario that was run with its verdict, for the history."""
-    return {item.name: item.verdict.value for item in found.judged if not item.verdict.left_out}

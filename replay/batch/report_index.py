@@ -13,10 +13,10 @@ from typing import Any
 from urllib.parse import quote
 
 import replay
-from replay.batch.regress import Judged, Regression, Verdict
+from replay.batch.judged import OVERLAY, Judged, Regression, Verdict
 from replay.comparison import report_html
 
-_FILES = ("{name}.mcap", "{name}.rrd", "{name}.difference.rrd", "log.txt", "result.json")
+_FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, "log.txt", "result.json")
 _ORDER = [verdict for verdict in Verdict if not verdict.fine] + [verdict for verdict in Verdict if verdict.fine]
 _OPEN = 3
 """As many failing scenarios are shown open; more of them would hide one another."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import replay
-from replay.batch.regress import Judged, Regression, Verdict
+from replay.batch.judged import Judged, Regression, Verdict
 from replay.comparison.report_text import text
 from replay.comparison.runs import RunDifference
 
@@ -46,6 +46,7 @@ def junit(found: Regression) -> bytes:
         ("baseline", str(found.baseline)),
         ("rules", found.rules or "none"),
         ("unused baselines", ", ".join(found.unused)),
+        ("interrupted", "yes" if found.run.interrupted else "no"),
     ):
         ElementTree.SubElement(properties, "property", {"name": name, "value": _clean(value)})
     for item in found.judged:

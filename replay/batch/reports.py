@@ -7,10 +7,12 @@ from pathlib import Path
 
 import replay
 from replay.batch.history import Night, append_night, failing_since, read_history
-from replay.batch.regress import Regression, verdicts
+from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
-from replay.batch.run import as_json, write
+from replay.batch.run import as_json
+from replay.errors import WriteError
+from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
 
@@ -23,16 +25,18 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         history: where nights are kept; RUNDIR/history.jsonl when left out.
 
     Raises:
-        WriteError: a file cannot be written.
+        WriteError: a file cannot be written; when it is the history, the others have been.
     """
     history = history or found.run.directory / HISTORY
-    nights = read_history(history)
+    unknown: WriteError | None = None
+    try:
+        nights = read_history(history)
+    except WriteError as error:  # the night itself is not lost for it
+        nights, unknown = [], error
     failing = frozenset(item.name for item in found.judged if not item.verdict.fine)
     earlier = {name: failing_since(nights, name) for name in failing}
     since = {name: time for name, time in earlier.items() if time is not None}
     started = found.run.started.isoformat(timespec="seconds")
-    if not found.run.interrupted:
-        append_night(history, Night(started, replay.__version__, verdicts(found), failing))
     directory = found.run.directory
     summary = {
         **as_json(found.run),
@@ -49,9 +53,13 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         },
         "unused_baselines": list(found.unused),
     }
-    write(directory / "run.json", json.dumps(summary, indent=1) + "\n")
-    write(directory / "junit.xml", junit(found).decode())
-    write(directory / "index.html", index(found, since))
+    write_file(directory / "run.json", json.dumps(summary, indent=1) + "\n")
+    write_file(directory / JUNIT, junit(found))
+    write_file(directory / INDEX, index(found, since))
+    if unknown is not None:
+        raise unknown
+    if not found.run.interrupted:
+        append_night(history, Night(started, replay.__version__, verdicts(found), failing))
 
 
 def describe(found: Regression) -> list[str]:
@@ -59,6 +67,7 @@ def describe(found: Regression) -> list[str]:
     failing = [item for item in found.judged if not item.verdict.fine]
     lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
     lines += [f"unused baseline: {name}" for name in found.unused]
+    lines += ["interrupted: the reports are partial"] if found.run.interrupted else []
     counts = {verdict: found.count(verdict) for verdict in dict.fromkeys(item.verdict for item in found.judged)}
     lines.append(
         f"{len(found.judged)} scenarios: " + ", ".join(f"{n} {verdict.value}" for verdict, n in counts.items())

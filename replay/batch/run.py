@@ -14,7 +14,7 @@ import platform
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import psutil
 
@@ -24,7 +24,9 @@ from replay.batch.cost import expected_cost
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import RESULT, earlier_result
-from replay.errors import RecordingExistsError, WriteError
+from replay.batch.watch import Unwatched, Watch
+from replay.errors import NoSpaceError, RecordingExistsError, WriteError
+from replay.logs.part_file import write_error, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -46,38 +48,6 @@ class Execution:
     timeout: float | None = None
     memory: int | None = None
     dask: str | None = None
-
-
-class Watch(Protocol):
-    """Who follows a run."""
-
-    def plan(self, costs: dict[str, float]) -> None:
-        """Take what is going to run: names with expected costs."""
-
-    def follow(self, name: str, done: int, total: int) -> None:
-        """Take how many frames of a scenario are done; (name, 0, 0) when it begins."""
-
-    def done(self, result: CaseResult) -> None:
-        """Take what became of a scenario."""
-
-    def tell(self, text: str) -> None:
-        """Take a remark."""
-
-
-class Unwatched:
-    """Nobody follows."""
-
-    def plan(self, costs: dict[str, float]) -> None:
-        """Do nothing."""
-
-    def follow(self, name: str, done: int, total: int) -> None:
-        """Do nothing."""
-
-    def done(self, result: CaseResult) -> None:
-        """Do nothing."""
-
-    def tell(self, text: str) -> None:
-        """Do nothing."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +89,9 @@ def run_all(
 ) -> Run:
     """Run scenarios, each into DIRECTORY/NAME/, and write DIRECTORY/run.json.
 
-    A scenario that fails, crashes, hangs or eats memory does not stop the others; its result says so. An interrupt
-    (Ctrl-C) ends all processes and is told by `interrupted`; what was finished is kept.
+    A scenario that fails, crashes, hangs, eats memory or has a folder that cannot be written does not stop the others;
+    its result says so. An interrupt (Ctrl-C) ends all processes and is told by `interrupted`; what was finished stays.
+    Until it is over the run folder says that it was interrupted, so that one that was killed is never taken for whole.
 
     Args:
         scenarios: what to run.
@@ -134,7 +105,7 @@ def run_all(
 
     Raises:
         RecordingExistsError: a recording exists and may not be overwritten; nothing is run then.
-        WriteError: the run folder cannot be written.
+        WriteError: the run folder cannot be written; NoSpaceError when the disk becomes full.
         WorkerError: worker processes cannot be started.
     """
     execution, watch, directory = execution or Execution(), watch or Unwatched(), Path(directory)
@@ -149,35 +120,42 @@ def run_all(
                     raise RecordingExistsError(str(recording))
     left = [scenario for scenario in scenarios if scenario.name not in results]
     costs = {scenario.name: expected_cost(scenario) for scenario in left}
-    watch.plan(costs)
-    tasks = []
-    for scenario in left:
-        folder = directory / scenario.name
-        write(folder / "log.txt", "")
-        tasks.append(
-            Task(scenario.name, CaseOrder(scenario, folder, model, rrd), costs[scenario.name], folder / "log.txt")
-        )
-    interrupted = False
-    workers = min(execution.workers or os.cpu_count() or 1, max(len(tasks), 1))
+    workers = min(execution.workers or os.cpu_count() or 1, max(len(left), 1))
+    interrupted = True
+
+    def write_summary() -> Run:
+        lost = "the run was ended before this scenario was"
+        ended = [results.get(s.name, CaseResult(s.name, Status.INTERRUPTED, error=lost)) for s in scenarios]
+        seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
+        run = Run(directory, tuple(ended), interrupted, started, seconds, workers)
+        write_file(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
+        return run
+
+    write_summary()
     try:
+        watch.plan(costs)
+        tasks = []
+        for scenario in left:
+            log = directory / scenario.name / "log.txt"
+            try:
+                write_file(log, "")
+            except WriteError as error:
+                results[scenario.name] = _unwritable(scenario.name, error)
+                watch.done(results[scenario.name])
+                continue
+            order = CaseOrder(scenario, log.parent, model, rrd)
+            tasks.append(Task(scenario.name, order, costs[scenario.name], log))
         with contextlib.closing(_endings(tasks, workers, execution, watch)) as endings:
             for ended in endings:
-                result = _result(ended)
-                _finish(result, ended.task.payload.folder)
+                result = _finish(_result(ended), ended.task.payload.folder)
                 results[result.name] = result
                 watch.done(result)
+        interrupted = False
     except KeyboardInterrupt:
-        interrupted = True
-    for scenario in scenarios if interrupted else ():
-        if scenario.name not in results:
-            _remove_unfinished(directory / scenario.name)
-        lost = CaseResult(scenario.name, Status.INTERRUPTED, error="the run was ended before this scenario was")
-        results.setdefault(scenario.name, lost)
-    seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
-    ordered = tuple(results[scenario.name] for scenario in scenarios)
-    run = Run(directory, ordered, interrupted, started, seconds, workers)
-    write(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
-    return run
+        for scenario in left:
+            if scenario.name not in results:
+                _remove_unfinished(directory / scenario.name)
+    return write_summary()
 
 
 def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: Watch) -> Generator[Ended]:
@@ -188,6 +166,7 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
         "memory": execution.memory,
         "prepare": PrepareKernels(tuple(needs), rrd=any(order.rrd for order in orders)),
         "follow": watch.follow,
+        "check": watch.check,
     }
     if execution.dask is not None:
         from replay.batch.cluster import Cluster
@@ -220,18 +199,37 @@ def _result(ended: Ended) -> CaseResult:
     )
 
 
-def _finish(result: CaseResult, folder: Path) -> None:
-    """Leave the folder as the result says: no recording of an earlier run beside the failure of this one."""
+def _finish(result: CaseResult, folder: Path) -> CaseResult:
+    """Leave the folder as the result says: no recording of an earlier run beside the failure of this one.
+
+    Returns:
+        The result, or that the folder cannot be written.
+    """
     if not result.status.recorded:
         for kind in (".mcap", ".rrd"):
             with contextlib.suppress(OSError):
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
-    write(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
     try:
-        with (folder / "log.txt").open("a", encoding="utf-8") as log:
-            log.writelines(f"{line}\n" for line in describe(result))
+        write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
+        _append(folder / "log.txt", describe(result))
+    except WriteError as error:
+        return dataclasses.replace(_unwritable(result.name, error), seconds=result.seconds, memory=result.memory)
+    return result
+
+
+def _append(path: Path, lines: Sequence[str]) -> None:
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.writelines(f"{line}\n" for line in lines)
     except OSError as error:
-        raise WriteError(str(folder / "log.txt"), error.strerror or str(error)) from None
+        raise write_error(path, error) from None
+
+
+def _unwritable(name: str, error: WriteError) -> CaseResult:
+    """Return the result of a scenario whose folder cannot be written; a full disk ends the run."""
+    if isinstance(error, NoSpaceError):
+        raise error
+    return CaseResult(name, Status.FAILED, error=str(error))
 
 
 def _remove_unfinished(folder: Path) -> None:
@@ -266,12 +264,3 @@ def as_json(run: Run) -> dict[str, object]:
             for result in run.results
         },
     }
-
-
-def write(path: Path, text: str) -> None:
-    """Write a text file and the folders that it needs; WriteError when that is not possible."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise WriteError(str(path), error.strerror or str(error)) from None

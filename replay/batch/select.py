@@ -71,7 +71,8 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
             continue
         for scenario in found:
             if scenario.name in homes:
-                problems.append(Problem(f"name {scenario.name!r} is taken by {homes[scenario.name]}", file=str(path)))
+                rule = f"name {scenario.name!r} is taken by {homes[scenario.name]}; each scenario of a run has its own"
+                problems.append(Problem(rule, file=str(path)))
             homes[scenario.name] = path
             scenarios.append(scenario)
     if problems:

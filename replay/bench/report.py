@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.bench.measure import Goal, Row
-from replay.errors import WriteError
+from replay.logs.part_file import write_file
 
 PACKAGES = (
     "numpy",
@@ -107,12 +107,8 @@ class Report:
     def write(self, directory: Path) -> tuple[Path, Path]:
         """Write `<name>.json` and `<name>.html` into a directory and return their paths."""
         data, page = directory / f"{self.name}.json", directory / f"{self.name}.html"
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            data.write_text(json.dumps(self.as_json(), indent=1) + "\n", encoding="utf-8")
-            page.write_text(self.as_html(), encoding="utf-8")
-        except OSError as error:
-            raise WriteError(str(directory), error.strerror or str(error)) from error
+        write_file(data, json.dumps(self.as_json(), indent=1) + "\n")
+        write_file(page, self.as_html())
         return data, page
 
     def as_html(self) -> str:

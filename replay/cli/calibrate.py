@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.options import announce_compiling, format_option, note, say
+from replay.cli.options import format_option, note, say
 
 FILE = click.Path(path_type=Path)
 
@@ -42,7 +42,6 @@ def calibrate(scenario: Path, curve: Path, filters: tuple[str, ...], output: Pat
     for wrong in (entry for entry in filters if "=" not in entry):
         raise click.BadParameter(f"{wrong!r} is not COLUMN=VALUE", param_hint="--where")
     where = {name.strip(): value for name, _, value in (entry.partition("=") for entry in filters)}
-    announce_compiling()
     path = SensorPath(load(scenario), sensor=given["sensor"], joint=given["joint"])
     fit = fit_curve(
         path,

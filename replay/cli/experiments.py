@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.options import announce_compiling, format_option, note, say
+from replay.cli.options import format_option, note, say
 
 FOLDER = click.Path(path_type=Path)
 
@@ -34,7 +34,6 @@ def experiments(names: tuple[str, ...], output: Path, scenarios: Path, overwrite
     """
     from replay.bench.experiments.run import EXPERIMENTS, run, write
 
-    announce_compiling()
     tables, files = [], []
     for name in names or EXPERIMENTS:
         found, panels = run(name, scenarios)

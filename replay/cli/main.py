@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import sys
 import traceback
@@ -30,6 +31,9 @@ COMMANDS = {
 }
 """Help by name of command; each is the function of that name in the module of that name."""
 
+MAX_LINES = 100
+"""Lines of one error that are shown; a mistake in a sweep is one line for each of its cases."""
+
 
 class LazyGroup(click.Group):
     """A group whose commands are imported when they are used: `--help` needs none of them."""
@@ -44,6 +48,15 @@ class LazyGroup(click.Group):
             return None
         command: click.Command = getattr(importlib.import_module(f"replay.cli.{name}"), name)
         return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """Return a command and its arguments; a name that is none is told with what it may have meant."""
+        close = difflib.get_close_matches(args[0], COMMANDS, n=1)
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            ctx.fail(
+                f"No such command {args[0]!r}; " + (f"did you mean {close[0]!r}?" if close else ", ".join(COMMANDS))
+            )
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands from the table, so that no module is imported for it."""
@@ -64,8 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     files and takes the viewer with it.
     """
     interruption.install()
-    code = run(arguments)
-    sys.exit(int(ExitCode.INTERRUPTED if interruption.requested() else code))
+    code = ExitCode.INTERRUPTED
+    try:
+        code = run(arguments)
+        interrupted = interruption.over()
+    except KeyboardInterrupt:  # at the command's very end
+        interrupted = interruption.over()
+    sys.exit(int(ExitCode.INTERRUPTED if interrupted else code))
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
@@ -74,12 +92,20 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
         result: Any = replay_command.main(args=arguments, prog_name="replay", standalone_mode=False)
     except click.exceptions.Exit as left:
         return ExitCode(left.exit_code)
-    except click.ClickException as error:
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
         return ExitCode.INVALID
+    except click.ClickException as error:
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        hint = f"; see {context.command_path} --help" if context else ""
+        click.echo(f"replay: error: {error.format_message().rstrip('.')}{hint}", err=True)
+        return ExitCode.INVALID
     except ReplayError as error:
-        for line in str(error).splitlines():
+        lines = str(error).splitlines()
+        for line in lines[:MAX_LINES]:
             click.echo(f"replay: error: {line}", err=True)
+        if len(lines) > MAX_LINES:
+            click.echo(f"replay: error: ... and {len(lines) - MAX_LINES} more", err=True)
         return ExitCode.INVALID
     except (KeyboardInterrupt, click.Abort):
         click.echo("replay: interrupted", err=True)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.values import Memory, Seconds, ShardOf
+from replay.cli.values import Memory, Seconds, ShardOf, Workers
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -33,7 +33,7 @@ format_option = click.option(
     help="Form of the result.",
 )
 _EXECUTION = (
-    click.option("--workers", type=click.IntRange(1), help="Processes; as many as there are cores when left out."),
+    click.option("--workers", type=Workers(), help="Processes; as many as there are cores when left out."),
     click.option("--timeout", type=Seconds(), help="Longest time of one scenario, such as 90s or 10min."),
     click.option("--memory", type=Memory(), help="Most resident memory of one scenario, such as 2GiB."),
     click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead."),
@@ -65,14 +65,6 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
 def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:
     """Write a result to stdout as text for people or as JSON for programs."""
     click.echo(text() if form == "text" else json.dumps(data(), indent=1))
-
-
-def announce_compiling() -> None:
-    """Say on stderr that kernels will be compiled, when none are."""
-    from replay.numerics.jit import is_cache_empty
-
-    if is_cache_empty():
-        note("compiling kernels; this takes about a minute, once")
 
 
 def note(message: str) -> None:

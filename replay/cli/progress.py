@@ -66,6 +66,15 @@ class RunProgress:
             self.tell(f"[{self._done}/{len(self._costs)}] {state}{self._left()}")
         self._show()
 
+    def compare(self, name: str) -> None:
+        """Show which scenario is compared."""
+        interruption.check()
+        self._bars.update(self._all, description=f"comparing {escape(name)}")
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt when the command was asked to stop."""
+        interruption.check()
+
     def tell(self, text: str) -> None:
         """Say something above the bars."""
         self._console.print(f"replay: {text}", markup=False, soft_wrap=True)

@@ -41,10 +41,9 @@ def regress(
     Exit codes: 1 something differs; 4 a scenario failed or has no baseline; 130 interrupted (the reports are partial).
     """
     from replay.batch.regress import regress as judge
-    from replay.batch.reports import describe, write_reports
     from replay.batch.select import Selection, rules_beside
     from replay.cli.progress import RunProgress
-    from replay.cli.results import regression_code
+    from replay.cli.results import report
     from replay.comparison.rules_file import read_rules
 
     settings = options.settings(how)
@@ -56,6 +55,4 @@ def regress(
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
     with RunProgress() as watch:
         found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
-        write_reports(found, history=history)
-    click.echo("\n".join([*describe(found), f"report: {output / 'index.html'}"]))
-    return regression_code(found)
+    return report(found, history=history)

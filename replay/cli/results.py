@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
+from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode, worst
 from replay.cli.options import say
 
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
-    from replay.batch.regress import Regression
+    from replay.batch.judged import Regression
     from replay.batch.run import Run
 
 
@@ -22,18 +26,28 @@ def show(form: str, run: Run) -> None:
         paths = [f"  {path}" for path in (found.mcap, found.rrd) if path] if found else []
         return "\n".join([*describe(result), *paths])
 
+    interruption.settle()
     say(form, lambda: "\n".join(map(text, run.results)), lambda: [result.as_json() for result in run.results])
 
 
 def exit_code(run: Run) -> ExitCode:
-    """Return what the shell is told of a run."""
+    """Return what the shell is told of a run; nothing but invalid scenarios is invalid input."""
+    if run.results and all(result.invalid for result in run.results):
+        return ExitCode.INVALID
     interrupted = ExitCode.INTERRUPTED if run.interrupted else ExitCode.FINE
     return worst([interrupted, ExitCode.FINE if run.passed else ExitCode.FAILED])
 
 
-def regression_code(found: Regression) -> ExitCode:
-    """Return what the shell is told of a regression."""
-    return worst([exit_code_of(item.verdict.name) for item in found.judged])
+def report(found: Regression, *, history: Path | None) -> ExitCode:
+    """Write a regression's reports and say what became of it; return what the shell is told."""
+    from replay.batch.judged import INDEX
+    from replay.batch.reports import describe, write_reports
+
+    interruption.settle()
+    write_reports(found, history=history)
+    click.echo("\n".join([*describe(found), f"report: {found.run.directory / INDEX}"]))
+    interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
+    return worst([interrupted, *(exit_code_of(item.verdict.name) for item in found.judged)])
 
 
 def exit_code_of(verdict: str) -> ExitCode:

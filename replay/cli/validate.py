@@ -8,6 +8,7 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, nothing, say, scenarios_argument, select_option
+from replay.errors import Problem, ScenarioError
 
 
 @click.command()
@@ -18,27 +19,36 @@ from replay.cli.options import format_option, note, nothing, say, scenarios_argu
 def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...], form: str) -> ExitCode:
     """Check SCENARIOS (files or folders): every problem is one line with file, line, column and what would work."""
     from replay.batch.select import load_all, select
+    from replay.scenario.notes import notes
 
+    if deep:
+        from replay.scenario.scene import build
     chosen = select(load_all(scenarios), patterns)
     if not chosen:
         return nothing(patterns)
-    lines = [f"{s.name}: valid, {s.frames} frames, {len(s.links)} links" for s in chosen]
-    data = [{"scenario": s.name, "frames": s.frames, "links": len(s.links), "tags": list(s.tags)} for s in chosen]
-    if deep:
-        from replay.scenario.scene import build
-
-        for number, scenario in enumerate(chosen):
-            scene = build(scenario)
-            counts = {
-                "shapes": len(scene.shapes),
-                "triangles": sum(len(shape.solid.triangles) for shape in scene.shapes),
-                "pairs": len(scene.pairs),
-                "distance_sensors": len(scene.distance_sensors),
-                "capacitive_sensors": len(scene.capacitive_sensors),
-            }
-            data[number] |= {**counts, "notes": list(scene.notes)}
-            lines[number] += "".join(f", {count} {what.replace('_', ' ')}" for what, count in counts.items())
-            for remark in scene.notes:
-                note(remark)
+    lines, data = [], []
+    problems: list[Problem] = []
+    for scenario in chosen:
+        remarks = notes(scenario)
+        shown = [str(remark) for remark in remarks]
+        counts = {"frames": scenario.frames, "links": len(scenario.links)}
+        kept = [remark.message for remark in remarks]
+        if deep:
+            try:
+                scene = build(scenario)
+            except ScenarioError as error:
+                problems.extend(error.problems)
+                continue
+            counts |= scene.counts
+            kept = list(scene.notes)
+            shown.extend(kept[len(remarks) :])
+        lines.append(
+            f"{scenario.name}: valid" + "".join(f", {n} {what.replace('_', ' ')}" for what, n in counts.items())
+        )
+        data.append({"scenario": scenario.name, **counts, "tags": list(scenario.tags), "notes": kept})
+        for remark in shown:
+            note(f"note: {remark}")
+    if problems:
+        raise ScenarioError(problems)
     say(form, lambda: "\n".join(lines), lambda: data)
     return ExitCode.FINE

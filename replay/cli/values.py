@@ -1,4 +1,4 @@
-"""Values of options as people write them: amounts of memory, times, shards."""
+"""Values of options as people write them: amounts of memory, times, shards, numbers of processes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,18 @@ import click
 
 _MEMORY_UNITS = {"MB": 10**6, "GB": 10**9, "MiB": 2**20, "GiB": 2**30}
 _TIME_UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+class Workers(click.ParamType[int]):
+    """A number of processes."""
+
+    name = "N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        if re.fullmatch("0*[1-9][0-9]{0,5}", str(value)) is None:
+            self.fail(f"{value!r} is no number of processes; write 1 or more")
+        return int(value)
 
 
 class Memory(click.ParamType[int]):

@@ -32,6 +32,7 @@ def compare(
     strict_provenance: bool = False,
     scene: Iterable[Change] = (),
     added: Iterable[Change] = (),
+    equal: int = 0,
 ) -> Difference:
     """Return how a candidate differs from a baseline.
 
@@ -41,6 +42,7 @@ def compare(
         strict_provenance: other versions, models and inputs make the verdict "different".
         scene: changes of the scene or the schemas, which recordings do not hold in columns.
         added: what only the candidate's schemas have; told with the provenance.
+        equal: number of signals that are known to be equal and are in neither recording.
     """
     rules = rules or Rules()
     frames, matched = match_frames(baseline.time, candidate.time, rules)
@@ -74,7 +76,7 @@ def compare(
         missing=missing,
         extra=extra,
         signals=tuple(sorted(signals, key=lambda signal: (not signal.decides, signal.signal))),
-        compared=total - sum(len(absence.signals) for absence in missing),
+        compared=equal + total - sum(len(absence.signals) for absence in missing),
         strict_provenance=strict_provenance,
     )
     return dataclasses.replace(found, expired=expired_rules(found, rules))
@@ -129,10 +131,10 @@ def _units(groups_a: Mapping[tuple[str, str], Group], groups_b: Mapping[tuple[st
 
 def _event_messages(baseline: Recording, candidate: Recording) -> Iterator[Change]:
     if baseline.events != candidate.events:
-        only_a = set(baseline.events) - set(candidate.events)
-        only_b = set(candidate.events) - set(baseline.events)
+        only_a = baseline.events.count_missing_in(candidate.events)
+        only_b = candidate.events.count_missing_in(baseline.events)
         yield Change(
             EVENTS,
-            f"{len(baseline.events)} events, {len(only_a)} of them only here",
-            f"{len(candidate.events)} events, {len(only_b)} of them only here",
+            f"{len(baseline.events)} events, {only_a} of them only here",
+            f"{len(candidate.events)} events, {only_b} of them only here",
         )

@@ -1,4 +1,4 @@
-"""What two files say apart from their columns: scene, schemas, and whether their messages are the same bytes."""
+"""What two files say apart from their columns: scene, schemas, and which topics are the same bytes."""
 
 from __future__ import annotations
 
@@ -23,19 +23,37 @@ SCHEMAS = "/schemas"
 _MAX_DEPTH = 32
 
 
-def same_messages(a: McapLog, b: McapLog) -> bool:
-    """Return whether all messages of two files are the same, because their chunks are the same bytes.
+def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
+    """Return the topics whose messages are the same in two files, because their chunks are the same bytes.
 
-    Metadata and attachments may differ. False does not mean that any message differs.
+    Nothing is unpacked for it. A topic that is not among them may be the same all the same.
     """
-    if a.channels != b.channels or a.schemas != b.schemas or len(a.chunks) != len(b.chunks):
-        return False
+    chunks_a, chunks_b = _chunks_by_channel(a), _chunks_by_channel(b)
+    equal = []
     with a.path.open("rb") as file_a, b.path.open("rb") as file_b:
-        return all(
-            (x.compression, x.compressed_size) == (y.compression, y.compressed_size)
-            and _packed(file_a, x) == _packed(file_b, y)
-            for x, y in zip(a.chunks, b.chunks, strict=True)
-        )
+        for number, channel in a.channels.items():
+            if channel != b.channels.get(number) or a.schemas[channel.schema_id] != b.schemas[channel.schema_id]:
+                continue
+            mine, others = chunks_a.get(number, []), chunks_b.get(number, [])
+            if [_packing(chunk) for chunk in mine] == [_packing(chunk) for chunk in others] and all(
+                _packed(file_a, x) == _packed(file_b, y) for x, y in zip(mine, others, strict=True)
+            ):
+                equal.append(channel.topic)
+    return frozenset(equal if chunks_a and chunks_b else ())
+
+
+def _chunks_by_channel(log: McapLog) -> dict[int, list[Chunk]]:
+    """Return the chunks of each channel; nothing for a file that is not laid out as replay writes recordings."""
+    found: dict[int, list[Chunk]] = {}
+    for chunk in log.chunks:
+        if len(chunk.channels) != 1:
+            return {}
+        found.setdefault(chunk.channels[0], []).append(chunk)
+    return found
+
+
+def _packing(chunk: Chunk) -> tuple[str, int, int]:
+    return chunk.compression, chunk.uncompressed_size, chunk.compressed_size
 
 
 def _packed(file: BinaryIO, chunk: Chunk) -> bytes:
@@ -44,8 +62,14 @@ def _packed(file: BinaryIO, chunk: Chunk) -> bytes:
 
 
 def scene_changes(a: McapLog, b: McapLog) -> tuple[Change, ...]:
-    """Return the bodies of the scene that differ, by name: their shape, their colour, or the link that they are on."""
+    """Return the bodies of the scene that differ, by name: their shape, their colour, or the link that they are on.
+
+    A scene that only one file has is one change.
+    """
     bodies_a, bodies_b = _bodies(a), _bodies(b)
+    if bodies_a is None or bodies_b is None:
+        counts = (None if bodies is None else f"{len(bodies)} bodies" for bodies in (bodies_a, bodies_b))
+        return () if bodies_a is bodies_b else (Change(SCENE, *counts),)
     return tuple(_changes(SCENE, bodies_a, bodies_b))
 
 
@@ -91,9 +115,9 @@ def _scene(log: McapLog) -> Any:
     return None
 
 
-def _bodies(log: McapLog) -> dict[str, str]:
+def _bodies(log: McapLog) -> dict[str, str] | None:
     scene = _scene(log)
-    return {} if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
+    return None if scene is None else {f"/{entity.id}": _described(entity) for entity in scene.entities}
 
 
 def _described(entity: Any) -> str:

@@ -9,7 +9,7 @@ from replay.comparison.difference import Verdict
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.runs import Case, Pair, RunDifference
-from replay.errors import WriteError
+from replay.logs.part_file import write_file
 
 
 class Outputs:
@@ -45,14 +45,6 @@ class Outputs:
             WriteError: a file cannot be written.
         """
         if self._html is not None:
-            _write(self._html, report_html.html(found, self._drawn).encode())
+            write_file(self._html, report_html.html(found, self._drawn))
         if self._junit is not None:
-            _write(self._junit, report_junit.junit(found))
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-    except OSError as error:
-        raise WriteError(str(path), error.strerror or str(error)) from None
+            write_file(self._junit, report_junit.junit(found))

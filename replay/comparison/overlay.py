@@ -21,9 +21,9 @@ from replay.comparison.log_changes import read_scene
 from replay.comparison.plots import Curve, Curves
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, Pair, RunDifference
-from replay.logs.part_file import PartFile
 from replay.recording.blueprint import TIMELINE
-from replay.recording.reader import Recording
+from replay.recording.reader import Recording, read
+from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_log import APPLICATION
 
 Color = tuple[int, int, int, int]
@@ -61,28 +61,26 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
     """
     import rerun as rr
 
-    file = PartFile(Path(path), overwrite=overwrite)
-    stream = rr.RecordingStream(APPLICATION)
+    file = RerunFile(path, overwrite=overwrite)
     try:
         marks = sorted(_marks(case), key=lambda mark: mark.at.time)
         shown = case.difference.signals[:CURVES]
-        stream.save(file.part, default_blueprint=_blueprint(marks, list(dict.fromkeys(map(_chart, shown)))))
+        blueprint = _blueprint(marks, list(dict.fromkeys(map(_chart, shown))))
+        stream = file.open(APPLICATION, default_blueprint=blueprint)
         stream.send_recording_name(f"{case.name}: baseline and candidate")
         summary = text(RunDifference(str(case.baseline), str(case.candidate), (case,)), verbose=True)
         stream.log("summary", rr.TextDocument(summary), static=True)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for side, recording in ((BASELINE, pair.baseline), (CANDIDATE, pair.candidate)):
             _log_scene(stream, side, recording)
-            _log_poses(stream, side, recording)
+            # a pair lacks the topics that are equal in both
+            _log_poses(stream, side, recording if recording.layout.links else read(recording.path, topics=["/tf"]))
         curves = Curves(pair)
         for item in shown:
             _log_curve(stream, item, curves.curve(item), pair.baseline)
         _log_marks(stream, marks)
-        stream.flush()
-        stream.disconnect()
         file.commit()
     except BaseException:
-        stream.disconnect()
         file.discard()
         raise
 

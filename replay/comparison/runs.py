@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,8 +10,9 @@ from typing import Any
 
 from replay.comparison.diff import compare
 from replay.comparison.difference import JSON_VERSION, Change, Difference, Verdict
-from replay.comparison.log_changes import same_messages, scene_changes, schema_changes
+from replay.comparison.log_changes import SCENE, equal_topics, scene_changes, schema_changes
 from replay.comparison.rules import Rules
+from replay.comparison.signals import places
 from replay.errors import InvalidValue, RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.reader import Recording, read, read_provenance
@@ -23,12 +23,19 @@ SCENARIOS = "/scenarios"
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two recordings of one scenario, with what their files say beside the columns."""
+    """Two recordings of one scenario, with what their files say beside the columns.
+
+    Attributes:
+        baseline, candidate: without the topics that are the same bytes in both.
+        scene, added: changes of the scene and the schemas, and what only the candidate's schemas have.
+        equal: number of signals in the topics that were left out.
+    """
 
     baseline: Recording
     candidate: Recording
     scene: tuple[Change, ...] = ()
     added: tuple[Change, ...] = ()
+    equal: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,20 +128,34 @@ def diff(
         a, b = (x if isinstance(x, Recording) else read(x) for x in (baseline, candidate))
         pair = Pair(a, b)
         return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
-    return diff_pair(read_pair(baseline, candidate), rules=rules, strict_provenance=strict_provenance)
+    pair = read_pair(baseline, candidate, rules=rules)
+    return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
 
 
-def read_pair(baseline: str | Path, candidate: str | Path) -> Pair:
-    """Read two recordings; when all their messages are the same bytes, unpack them once."""
+def read_pair(baseline: str | Path, candidate: str | Path, *, rules: Rules | None = None) -> Pair:
+    """Read two recordings, without the topics that are the same bytes in both and stand for the same signals.
+
+    Under a rule that lets no NaN pass, not even in both, all topics are read.
+    """
     with McapLog(baseline) as log_a, McapLog(candidate) as log_b:
-        if same_messages(log_a, log_b):
-            provenance = read_provenance(log_b)
-            recording = read(baseline)
-            if provenance.layout == recording.layout:
-                return Pair(recording, dataclasses.replace(recording, path=Path(candidate), provenance=provenance))
+        layout_a, layout_b = read_provenance(log_a).layout, read_provenance(log_b).layout
+        bytes_equal = equal_topics(log_a, log_b)
+        equal = {
+            topic
+            for topic in bytes_equal
+            if places(layout_a, topic) == places(layout_b, topic)
+            and (rules is None or all(rule.tolerance.nan == "equal" for rule in rules.active))
+        }
         lost, added = schema_changes(log_a, log_b)
-        scene = (*scene_changes(log_a, log_b), *lost)
-    return Pair(read(baseline), read(candidate), scene, added)
+        scene = () if SCENE in bytes_equal else scene_changes(log_a, log_b)
+        names = [{channel.topic for channel in log.channels.values()} for log in (log_a, log_b)]
+    return Pair(
+        read(baseline, topics=names[0] - equal if equal else None),
+        read(candidate, topics=names[1] - equal if equal else None),
+        (*scene, *lost),
+        added,
+        sum(places(layout_a, topic)[1] for topic in equal),
+    )
 
 
 def diff_pair(pair: Pair, *, rules: Rules | None, strict_provenance: bool = False) -> Difference:
@@ -146,6 +167,7 @@ def diff_pair(pair: Pair, *, rules: Rules | None, strict_provenance: bool = Fals
         strict_provenance=strict_provenance,
         scene=pair.scene,
         added=pair.added,
+        equal=pair.equal,
     )
 
 
@@ -181,7 +203,7 @@ def diff_runs(
         a, b = {"": Path(baseline)}, {"": Path(candidate)}
     cases = []
     for name in sorted(a.keys() & b.keys()):
-        pair = read_pair(a[name], b[name])
+        pair = read_pair(a[name], b[name], rules=rules)
         found = diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
         case = Case(name or found.name, a[name], b[name], found, of_folders=folders[0])
         if visit is not None:

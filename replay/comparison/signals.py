@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from replay.recording.reader import Recording
+    from replay.simulation import Layout
 
 Column = NDArray[Any]
 
@@ -187,6 +188,25 @@ def _capacitive(recording: Recording) -> Iterator[Group]:
         for shape in recording.layout.objects
     )
     yield Group(PER_OBJECT_FIELD, signals, columns.per_object.reshape(len(columns.per_object), len(signals)))
+
+
+def places(layout: Layout, topic: str) -> tuple[object, int]:
+    """Return the names that a topic's columns stand for, and how many signals it has.
+
+    Two topics of the same bytes are the same signals when these names are the same.
+    """
+    match topic.split("/")[1]:
+        case "joint_states":
+            return (layout.joints, layout.joint_units), len(JOINT_FIELDS) * len(layout.joints)
+        case "tf":
+            return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
+        case "collision":
+            return layout.pairs, len(COLLISION_FIELDS) * len(layout.pairs)
+        case "distance":
+            return layout.shapes, 2 + 3 * len(POINT_FIELDS) + len(INDEX_FIELDS)
+        case "capacitive":
+            return layout.objects, len(CAPACITIVE_FIELDS) + len(layout.objects)
+    return (), 0
 
 
 def _signals(topic: str, field_: Field, names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Signal, ...]:

@@ -17,6 +17,7 @@ from replay.comparison.difference import (
     Worst,
 )
 from replay.comparison.rules import EXACT, Rule
+from replay.comparison.signals import ROTATION_FIELD
 
 SHOWN_EVENTS = 5
 """Events of a signal in the short form."""
@@ -127,15 +128,15 @@ def _worst(item: SignalDifference) -> Iterator[str]:
         return
     together = relative is not None and relative.at == largest.at
     also = f" (rel {number(relative.error)})" if together and relative is not None else ""
-    yield f"worst abs {number(largest.error, unit)}{also} at {moment(largest.at)}{_values(largest, unit)}"
+    yield f"worst abs {number(largest.error, unit)}{also} at {moment(largest.at)}{_values(item, largest)}"
     if relative is not None and not together:
-        yield f"worst rel {number(relative.error)} at {moment(relative.at)}{_values(relative, unit)}"
+        yield f"worst rel {number(relative.error)} at {moment(relative.at)}{_values(item, relative)}"
 
 
-def _values(found: Worst, unit: str) -> str:
-    if found.baseline == 0.0 and found.candidate == found.error:
+def _values(item: SignalDifference, found: Worst) -> str:
+    if item.signal.field == ROTATION_FIELD.name:  # the angle between the two says it all
         return ""
-    return f": {found.baseline!r} -> {found.candidate!r} {unit}".rstrip()
+    return f": {found.baseline!r} -> {found.candidate!r} {item.signal.unit}".rstrip()
 
 
 def rule(item: Rule | None) -> str:

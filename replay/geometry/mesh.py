@@ -1,28 +1,22 @@
-"""Mesh files as solids: read by trimesh, checked here, with every repair and shortcoming told in the solid's notes."""
+"""Mesh files as solids: what they hold is checked, with every repair and shortcoming told in the solid's notes."""
 
 from __future__ import annotations
 
-import io
 import math
-import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MeshError
 from replay.geometry.hull import convex_hull, to_unit_box
+from replay.geometry.mesh_file import read_faces
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
 from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
 from replay.numerics.jit import kernel
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
-FORMATS = (".stl", ".obj", ".ply", ".glb")
-"""File endings that can be read; upper case too."""
 
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
 
@@ -53,11 +47,12 @@ def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> S
     if not 0.0 < scale < math.inf:
         raise InvalidValue("scale", scale, "must be finite and positive [m per unit of the file]")
     name = str(path)
-    vertices, faces = _read(Path(path), name, data)
+    vertices, faces = read_faces(path, data)
     if len(faces) == 0:
         raise MeshError(name, "holds no triangles")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(name, f"a triangle refers to vertex {faces.max()} of {len(vertices)}")
+    wrong = faces[(faces < 0) | (faces >= len(vertices))]
+    if len(wrong):
+        raise MeshError(name, f"a triangle refers to vertex {wrong[0]}; there are 0 to {len(vertices) - 1}")
     bad = np.count_nonzero(~np.isfinite(vertices[faces]).all(axis=(1, 2)))
     if bad:
         raise MeshError(name, f"{bad} of {len(faces)} triangles have a corner that is not finite")
@@ -110,46 +105,6 @@ def solid_from_triangles(triangles: Array) -> Solid:
         notes.append("inside out (its volume is negative): the triangles were turned over")
     pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
     return Solid(triangles, pieces=pieces, watertight=watertight, dropped=dropped, notes=tuple(notes))
-
-
-def _read(path: Path, name: str, data: bytes | None) -> tuple[Array, Indices]:
-    """Return the file's vertices (v, 3) and faces (f, 3) as it holds them, scene transforms applied."""
-    ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise MeshError(name, f"the file ending {path.suffix!r} is not one of {', '.join(FORMATS)}")
-    if data is None:
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise MeshError(name, error.strerror or "cannot be read") from error
-    if ending == ".stl":
-        _check_binary_stl(name, data)
-    import trimesh
-
-    try:
-        with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks that follow
-            warnings.simplefilter("ignore")
-            options: dict[str, Any] = {"skip_materials": True} if ending == ".obj" else {}
-            scene = trimesh.load_scene(io.BytesIO(data), file_type=ending[1:], process=False, **options)
-            mesh = scene.to_mesh()
-            vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    except Exception as error:  # a foreign parser on a foreign file may raise anything
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise MeshError(name, f"is not a readable {ending[1:].upper()} file: {reason[:200]}") from error
-    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
-
-
-def _check_binary_stl(name: str, data: bytes) -> None:
-    """Refuse a binary STL file that is not as long as its header says; text files begin with "solid"."""
-    if data[:5].lower() == b"solid":
-        return
-    announced = int.from_bytes(data[80:84], "little")
-    needed = 84 + 50 * announced
-    if len(data) < 84:
-        raise MeshError(name, f"is not a whole STL file: its header is cut; the file has {len(data)} bytes")
-    if len(data) < needed:
-        rule = f"its header announces {announced} triangles, which need {needed} bytes; the file has {len(data)}"
-        raise MeshError(name, f"is not a whole STL file: {rule}")
 
 
 def _have_area(triangles: Array) -> NDArray[np.bool_]:

@@ -193,15 +193,13 @@ class Linkage:
         return LinkPoses(self, local, world)
 
     def _parents_first(self) -> list[int]:
-        order: list[int] = []
-        placed: set[int] = {-1}
-        waiting = list(range(len(self.links)))
-        while waiting:
-            ready = [k for k in waiting if int(self.parents[k]) in placed]
-            if not ready:
-                names = [self.link_names[k] for k in waiting]
-                raise InvalidValue("links", names, "these links are their own ancestors; the parents must form trees")
-            order.extend(ready)
-            placed.update(ready)
-            waiting = [k for k in waiting if k not in placed]
+        children: dict[int, list[int]] = {}
+        for k, parent in enumerate(self.parents.tolist()):
+            children.setdefault(parent, []).append(k)
+        order = list(children.get(-1, ()))
+        for k in order:
+            order.extend(children.get(k, ()))
+        if len(order) < len(self.links):
+            names = [self.link_names[k] for k in sorted(set(range(len(self.links))) - set(order))]
+            raise InvalidValue("links", names, "these links are their own ancestors; the parents must form trees")
         return order

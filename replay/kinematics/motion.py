@@ -86,13 +86,38 @@ class JointStates:
     free_poses: Array
 
 
-def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
-    """Return the joint states at given times, after checking the whole script against every limit.
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A script planned for a linkage and checked against its limits; it answers for any times.
+
+    Attributes:
+        profiles: of the J joints, in the order of `Linkage.joint_names`.
+        paths: of the K free joints, in the order of `Linkage.free_names`; None for one that stays where it is.
+    """
+
+    profiles: tuple[Profile, ...]
+    paths: tuple[_FreePath | None, ...]
+
+    def states(self, seconds: Array) -> JointStates:
+        """Return the joint states at times (n,) [s]; those at one time do not depend on the others."""
+        n = len(seconds)
+        positions = np.empty((n, len(self.profiles)))
+        velocities = np.empty((n, len(self.profiles)))
+        for k, profile in enumerate(self.profiles):
+            positions[:, k], velocities[:, k] = profile.sample(seconds)
+        free_poses = transforms.identity(n, len(self.paths))
+        for k, path in enumerate(self.paths):
+            if path is not None:
+                free_poses[:, k] = path.poses(seconds)
+        return JointStates(positions, velocities, free_poses)
+
+
+def plan(linkage: Linkage, script: Script) -> Motion:
+    """Return the motion that a script describes, after checking the whole of it against every limit.
 
     Args:
         linkage: whose joints the script moves.
         script: see `Script`; each joint may be moved by one kind of entry only.
-        seconds: (n,) [s], times of the frames.
 
     Raises:
         InvalidValue: a joint does not exist, is of the wrong type or scripted twice, or times are out of order.
@@ -103,17 +128,17 @@ def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
     it exists, inside the intervals.
     """
     profiles = joint_profiles(linkage, script)
-    n = len(seconds)
-    positions = np.empty((n, len(linkage.joints)))
-    velocities = np.empty((n, len(linkage.joints)))
-    for k, joint in enumerate(linkage.joints):
+    for joint in linkage.joints:
         check_limits(joint, profiles[joint.name])
-        positions[:, k], velocities[:, k] = profiles[joint.name].sample(seconds)
-    free_poses = transforms.identity(n, len(linkage.free_joints))
-    for k, joint in enumerate(linkage.free_joints):
-        if joint.name in script.free:
-            free_poses[:, k] = _free_poses(joint.name, script.free[joint.name], seconds)
-    return JointStates(positions, velocities, free_poses)
+    paths = tuple(
+        _FreePath.through(name, script.free[name]) if name in script.free else None for name in linkage.free_names
+    )
+    return Motion(tuple(profiles[joint.name] for joint in linkage.joints), paths)
+
+
+def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
+    """Return the joint states at times (n,) [s]; see `plan`."""
+    return plan(linkage, script).states(seconds)
 
 
 def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
@@ -199,20 +224,33 @@ def _planned(joints: Mapping[str, Joint], moves: tuple[Move, ...]) -> dict[str, 
     return {name: from_pieces(parts, joints[name].initial, position[name]) for name, parts in pieces.items()}
 
 
-def _free_poses(name: str, keyframes: tuple[Keyframe, ...], seconds: Array) -> Array:
-    """Poses (n, 4, 4) between key frames: position on a straight line, rotation by slerp, the end values hold."""
-    if not keyframes:
-        raise InvalidValue(f"motion.free.{name}", "[]", "must have at least one key frame")
-    times = np.array([key.time for key in keyframes])
-    if np.any(np.diff(times) <= 0.0):
-        raise InvalidValue(f"motion.free.{name}", times.tolist(), "times must strictly increase")
-    xyz = np.array([key.xyz for key in keyframes])
-    quat = np.array([key.quat_xyzw for key in keyframes])
-    quat = quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None]
-    begin = np.clip(np.searchsorted(times, seconds, side="right") - 1, 0, len(times) - 1)
-    end = np.minimum(begin + 1, len(times) - 1)
-    span = np.where(end > begin, times[end] - times[begin], 1.0)
-    fraction = np.clip((seconds - times[begin]) / span, 0.0, 1.0)
-    poses = transforms.from_quaternion(transforms.slerp(quat[begin], quat[end], fraction))
-    poses[:, :3, 3] = xyz[begin] + fraction[:, None] * (xyz[end] - xyz[begin])
-    return poses
+@dataclass(frozen=True, eq=False)
+class _FreePath:
+    """The way of a free joint: m times [s], positions (m, 3) [m] and unit quaternions (m, 4)."""
+
+    times: Array
+    xyz: Array
+    quat_xyzw: Array
+
+    @staticmethod
+    def through(name: str, keyframes: tuple[Keyframe, ...]) -> _FreePath:
+        if not keyframes:
+            raise InvalidValue(f"motion.free.{name}", "[]", "must have at least one key frame")
+        times = np.array([key.time for key in keyframes])
+        if np.any(np.diff(times) <= 0.0):
+            raise InvalidValue(f"motion.free.{name}", times.tolist(), "times must strictly increase")
+        quat = np.array([key.quat_xyzw for key in keyframes])
+        return _FreePath(
+            times, np.array([key.xyz for key in keyframes]), quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None]
+        )
+
+    def poses(self, seconds: Array) -> Array:
+        """Poses (n, 4, 4) between key frames: position on a straight line, rotation by slerp, the end values hold."""
+        times, xyz = self.times, self.xyz
+        begin = np.clip(np.searchsorted(times, seconds, side="right") - 1, 0, len(times) - 1)
+        end = np.minimum(begin + 1, len(times) - 1)
+        span = np.where(end > begin, times[end] - times[begin], 1.0)
+        fraction = np.clip((seconds - times[begin]) / span, 0.0, 1.0)
+        poses = transforms.from_quaternion(transforms.slerp(self.quat_xyzw[begin], self.quat_xyzw[end], fraction))
+        poses[:, :3, 3] = xyz[begin] + fraction[:, None] * (xyz[end] - xyz[begin])
+        return poses

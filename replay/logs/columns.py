@@ -39,10 +39,8 @@ class Topic:
     messages: tuple[Message, ...] | None
 
 
-def read_topics(
-    log: McapLog, topics: Collection[str] | None = None, *, as_messages: Collection[str] = ()
-) -> dict[str, Topic]:
-    """Return topics of a log (all when None) in one pass over its chunks; those in `as_messages` message by message.
+def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str, Topic]:
+    """Return topics of a log (all when None) in one pass over their chunks.
 
     Raises:
         RecordingError: damage, a topic that is not protobuf, a message that its schema does not describe, or a
@@ -53,9 +51,6 @@ def read_topics(
         for channel in sorted(log.channels.values(), key=lambda channel: channel.topic)
         if topics is None or channel.topic in topics
     }
-    for reader in wanted.values():
-        if reader.name in as_messages:
-            reader.restart()
     _pass(log, wanted)
     irregular = {channel: reader for channel, reader in wanted.items() if not reader.regular}
     for reader in irregular.values():
@@ -71,7 +66,7 @@ def read_topics(
 
 
 def _pass(log: McapLog, wanted: Mapping[int, _Reader]) -> None:
-    for chunk in log.chunks if wanted else ():
+    for chunk in log.chunks_with(wanted):
         for run in log.runs(chunk):
             if run.channel in wanted:
                 wanted[run.channel].add(run)

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -139,7 +139,9 @@ def _json(data: bytes) -> Sample:
     return int(stamp.get("sec", stamp.get("seconds", 0))) * 1_000_000_000 + int(fraction), joints
 
 
-def read_csv(name: str, data: bytes, *, time_column: str, nanoseconds: float) -> dict[str, JointTrack]:
+def read_csv(
+    name: str, data: bytes, *, time_column: str, nanoseconds: float, needed: Collection[str]
+) -> dict[str, JointTrack]:
     """Return the columns of a CSV log by their headings.
 
     Args:
@@ -147,6 +149,7 @@ def read_csv(name: str, data: bytes, *, time_column: str, nanoseconds: float) ->
         data: its bytes: UTF-8, comma separated, headings in the first line; an empty cell is no sample.
         time_column: heading of the column with the times.
         nanoseconds: that one unit of this column is [ns].
+        needed: headings of columns that must hold numbers; any other one that holds something else is passed over.
 
     Raises:
         RecordingError: there is no such column, or a line has another number of cells, or a cell is no finite number.
@@ -158,22 +161,28 @@ def read_csv(name: str, data: bytes, *, time_column: str, nanoseconds: float) ->
             raise RecordingError(name, f"has no column {time_column!r}; its columns are {headings}")
         if len(set(headings)) != len(headings):
             raise RecordingError(name, f"has a heading twice; its columns are {headings}")
-        tracks: Mapping[str, tuple[list[int], list[float]]] = {heading: ([], []) for heading in headings}
+        tracks: dict[str, tuple[list[int], list[float]]] = {k: ([], []) for k in headings if k != time_column}
         for line, cells in _lines(rows):
             if len(cells) != len(headings):
                 raise RecordingError(name, f"line {line} has {len(cells)} cells, its headings are {len(headings)}")
             values = {heading: cell.strip() for heading, cell in zip(headings, cells, strict=True)}
             time = round(_number(name, line, time_column, values[time_column]) * nanoseconds)
-            for heading, (times, positions) in tracks.items():
-                if heading != time_column and values[heading]:
-                    times.append(time)
+            for heading, (times, positions) in list(tracks.items()):
+                if not values[heading]:
+                    continue
+                try:
                     positions.append(_number(name, line, heading, values[heading]))
+                    times.append(time)
+                except RecordingError:
+                    if heading in needed:
+                        raise
+                    del tracks[heading]
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(name, f"cannot be read as CSV: {error}") from None
     return {
         heading: JointTrack(np.array(times, dtype=np.int64), np.array(positions))
         for heading, (times, positions) in tracks.items()
-        if heading != time_column and positions
+        if positions
     }
 
 

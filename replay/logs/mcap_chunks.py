@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import lz4.frame  # type: ignore[import-untyped]
@@ -16,6 +16,8 @@ from replay.errors import RecordingError
 from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
 
 _MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
+_op_and_length = struct.Struct("<BQ").unpack_from
+_channel_and_time = struct.Struct("<H4xQ").unpack_from
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,24 +82,34 @@ def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
     return Run(channel, stamps.astype(np.int64), rows[:, _MESSAGE_ROW:], ())
 
 
-def read_message(file: str, chunk: Chunk, content: bytes) -> tuple[int, int, bytes]:
-    """Return channel id, log time [ns] and data of one message record of a chunk."""
-    if len(content) < MESSAGE_HEAD:
-        raise _damage(file, chunk, "holds a message that ends inside a value")
-    channel, stamp = struct.unpack_from("<H4xQ", content)
-    _check_times(file, chunk, stamp, stamp)
-    return channel, stamp, content[MESSAGE_HEAD:]
+def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None]) -> list[Run]:
+    """Return the messages of any chunk by channel; `define` is called with its schema and channel records."""
+    found: dict[int, tuple[list[int], list[bytes]]] = {}
+    for op, begin, end in records(file, data):
+        if op == Op.MESSAGE:
+            if end - begin < MESSAGE_HEAD:
+                raise _damage(file, chunk, "holds a message that ends inside a value")
+            channel, stamp = _channel_and_time(data, begin)
+            times, payloads = found.get(channel) or found.setdefault(channel, ([], []))
+            times.append(stamp)
+            payloads.append(data[begin + MESSAGE_HEAD : end])
+        elif op in (Op.SCHEMA, Op.CHANNEL):
+            define(op, data[begin:end])
+    for times, _ in found.values():
+        _check_times(file, chunk, min(times), max(times))
+    return [Run(c, np.array(times, dtype=np.int64), None, tuple(p)) for c, (times, p) in sorted(found.items())]
 
 
 def records(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield opcode, begin and end of the content of records that follow one another."""
-    at = 0
-    while at < len(data):
-        if at + RECORD_HEAD > len(data):
+    at, size = 0, len(data)
+    while at < size:
+        if at + RECORD_HEAD > size:
             raise RecordingError(file, "damaged: a record ends inside its head")
-        op, length = struct.unpack_from("<BQ", data, at)
-        begin, at = at + RECORD_HEAD, at + RECORD_HEAD + length
-        if at > len(data):
+        op, length = _op_and_length(data, at)
+        begin = at + RECORD_HEAD
+        at = begin + length
+        if at > size:
             raise RecordingError(file, "damaged: a record is longer than what holds it")
         yield op, begin, at
 

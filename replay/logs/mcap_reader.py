@@ -10,15 +10,13 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-
 from replay.errors import RecordingError
-from replay.logs.mcap_chunks import Run, read_message, records, regular_run, unpack
+from replay.logs.mcap_chunks import Run, mixed_runs, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
     MAX_RECORD,
@@ -123,6 +121,19 @@ class McapLog:
             raise self._damage(f"its statistics claim {count} messages of one topic, more than it holds")
         return count
 
+    def chunks_with(self, channels: Collection[int]) -> list[Chunk]:
+        """Return the chunks that may hold messages of these channels, so that the others need not be unpacked.
+
+        A message index that keeps a channel quiet hides messages that the statistics count, so it is trusted where
+        there are statistics.
+        """
+        trusted = self.message_counts is not None and self.loss is None
+        return [
+            chunk
+            for chunk in self.chunks
+            if not trusted or not chunk.channels or any(channel in channels for channel in chunk.channels)
+        ]
+
     def runs(self, chunk: Chunk) -> Iterator[Run]:
         """Yield the messages of a chunk, unpacked and verified."""
         data = unpack(self._file, chunk, self._bytes_at(chunk.begin, chunk.compressed_size))
@@ -131,16 +142,9 @@ class McapLog:
             self._known(run.channel)
             yield run
             return
-        messages: list[tuple[int, int, bytes]] = []
-        for op, begin, end in records(self._file, data):
-            if op == Op.MESSAGE:
-                messages.append(read_message(self._file, chunk, data[begin:end]))
-            elif op in (Op.SCHEMA, Op.CHANNEL):
-                self._define(op, data[begin:end])
-        for channel in sorted({message[0] for message in messages}):
-            mine = [message for message in messages if message[0] == channel]
-            self._known(channel)
-            yield Run(channel, np.array([m[1] for m in mine], dtype=np.int64), None, tuple(m[2] for m in mine))
+        for run in mixed_runs(self._file, chunk, data, self._define):
+            self._known(run.channel)
+            yield run
 
     def close(self) -> None:
         """Close the file."""
@@ -219,7 +223,10 @@ class McapLog:
             if name == PREAMBLE:
                 self._check_crc(int(values.get("crc32", "")) if values.get("crc32", "").isdecimal() else -1, crc, name)
             self.metadata.append((name, values))
-        elif self._salvage and op != Op.MESSAGE_INDEX:
+        elif op == Op.MESSAGE_INDEX:
+            if self.chunks:
+                self.chunks[-1].channels.append(cursor.unsigned(2))
+        elif self._salvage:
             raise self._damage(f"the record at byte {begin - RECORD_HEAD} is of an unknown kind")
 
     def _loose_message(self, begin: int, size: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from replay.errors import RecordingError
 
@@ -66,7 +66,10 @@ class Channel:
 
 @dataclass(frozen=True)
 class Chunk:
-    """A compressed run of messages; the data lie at `begin` in the file."""
+    """A compressed run of messages; the data lie at `begin` in the file.
+
+    `channels` are the ids that the message indexes after the chunk name; empty when there are none.
+    """
 
     start_time: int
     end_time: int
@@ -75,6 +78,7 @@ class Chunk:
     compression: str
     begin: int
     compressed_size: int
+    channels: list[int] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from pathlib import Path
 from typing import BinaryIO
 
-from replay.errors import RecordingExistsError, WriteError
+from replay.errors import NoSpaceError, RecordingExistsError, WriteError
+
+_NO_SPACE = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT") if hasattr(errno, name)}  # the second: a quota's
 
 
 class PartFile:
@@ -68,9 +71,39 @@ class PartFile:
             self.part.unlink(missing_ok=True)
 
 
+def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path:
+    """Write a whole file and the folders that it needs, or leave what was there; return its path.
+
+    Devices, pipes and links, such as /dev/stdout, are written in place: a new file would take their name from them.
+
+    Raises:
+        RecordingExistsError: the file exists and `overwrite` is false.
+        WriteError: it cannot be written.
+    """
+    data = data.encode() if isinstance(data, str) else data
+    if overwrite and (path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())):
+        try:
+            path.write_bytes(data)
+        except OSError as error:
+            raise write_error(path, error) from None
+        return path
+    file = PartFile(path, overwrite=overwrite)
+    try:
+        file.write(data)
+        file.commit()
+    except BaseException:
+        file.discard()
+        raise
+    return path
+
+
 def write_error(path: Path, error: OSError) -> WriteError:
-    """Return the WriteError that says why the system refused `path`."""
-    return WriteError(str(path), error.strerror or str(error))
+    """Return the WriteError that says why the system refused `path`: a NoSpaceError when the disk is full."""
+    in_the_way = next((folder for folder in path.parents if folder.exists() and not folder.is_dir()), None)
+    if in_the_way is not None:
+        return WriteError(str(path), f"{in_the_way} is a file where a folder is needed")
+    kind = NoSpaceError if error.errno in _NO_SPACE else WriteError
+    return kind(str(path), error.strerror or str(error))
 
 
 def _sync_folder(folder: Path) -> None:

@@ -45,6 +45,7 @@ _VARINT = {
 _ZIGZAG = (FieldDescriptor.TYPE_SINT32, FieldDescriptor.TYPE_SINT64)
 _MAX_DEPTH = 32
 _MAX_SLOTS = 1_000_000  # beyond, a message is a mesh and not a row of readings
+_VARINT_BYTES = 10
 _WIRE_VARINT, _WIRE_64, _WIRE_LENGTH, _WIRE_32 = 0, 1, 2, 5
 
 
@@ -104,7 +105,7 @@ class Slot:
             narrow: Column = data.astype(_VARINT[self.field_type])
             return narrow
         value = np.zeros((len(data), self.count), dtype=np.uint64)
-        for place in range(min(self.width, 10)):
+        for place in range(self.width):
             part = (data[:, place :: self.width] & np.uint8(0x7F)).astype(np.uint64)
             value |= part << np.uint64(7 * place)
         if self.field_type in _ZIGZAG:
@@ -216,16 +217,16 @@ class _Walk:
     def packed(self, field: FieldDescriptor, at: int, end: int, path: str, index: int) -> None:
         if not field.is_repeated or index or at == end:
             raise _Irregular
-        begin, widths = at, set()
-        wire = _WIRE_VARINT if field.type in _VARINT else _WIRE_64
-        while at < end:
-            width = np.dtype(_FIXED[field.type]).itemsize if field.type in _FIXED else self.width(field, wire, at)
-            widths.add(width)
-            at += width
-        if at != end or len(widths) != 1:
+        if field.type in _FIXED:
+            width = np.dtype(_FIXED[field.type]).itemsize
+        else:
+            last = np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8)[at:end] < 0x80)  # bytes of the varints
+            width = int(last[0]) + 1 if len(last) else 0
+            if not 0 < width <= _VARINT_BYTES or not np.array_equal(np.diff(last), np.full(len(last) - 1, width)):
+                raise _Irregular
+        if (field.type not in _VARINT and field.type not in _FIXED) or (end - at) % width:
             raise _Irregular
-        width = widths.pop()
-        self.add(path, Slot(field.type, begin, width, (end - begin) // width, True))
+        self.add(path, Slot(field.type, at, width, (end - at) // width, True))
 
     def width(self, field: FieldDescriptor, wire: int, at: int) -> int:
         if wire == _WIRE_VARINT and field.type in _VARINT:
@@ -238,7 +239,7 @@ class _Walk:
 
     def varint(self, at: int) -> tuple[int, int]:
         value = 0
-        for place in range(10):
+        for place in range(_VARINT_BYTES):
             byte = self.data[at + place]
             value |= (byte & 0x7F) << 7 * place
             if byte < 0x80:

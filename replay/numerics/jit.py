@@ -24,12 +24,16 @@ import llvmlite.binding
 import numba
 from numba.core import config
 
+from replay.numerics import announcement
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 KERNEL_ROOMS = ("numerics", "geometry", "kinematics", "collision", "sensing")
 """The rooms of the package in which kernels live."""
 
 _KEPT_CACHES = 4  # a developer switches between a few branches; older folders are removed
+
+announcement.install()
 
 
 def source_hash(package: Path | None = None) -> str:
@@ -84,11 +88,6 @@ def _prune(base: Path, *, keep: Path) -> None:
     others.sort(key=lambda entry: entry.stat().st_mtime, reverse=True)
     for entry in others[_KEPT_CACHES - 1 :]:
         shutil.rmtree(entry, ignore_errors=True)
-
-
-def is_cache_empty() -> bool:
-    """Return whether no kernel of this version has been compiled on this machine yet."""
-    return next(cache_directory().rglob("*.nbi"), None) is None
 
 
 def kernel(function: Function) -> Function:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -19,6 +19,9 @@ _BLOCKS_BEHIND = 2
 
 class Writer(Protocol):
     """What takes blocks and becomes a file."""
+
+    def prepare(self) -> None:
+        """Do what needs no block; called once, before the first one."""
 
     def write(self, block: FrameBlock) -> None:
         """Append a block."""
@@ -67,12 +70,23 @@ class WriteBehind:
                 writer.discard()
 
     def _work(self) -> None:
+        self._guard(self._prepare)  # while the first block is computed
         while (block := self._queue.get()) is not None:
-            if self._error is not None:
-                continue  # keep taking blocks, so that `put` cannot wait for ever
+            self._guard(self._write, block)
+
+    def _prepare(self) -> None:
+        for writer in self._writers:
+            writer.prepare()
+
+    def _write(self, block: FrameBlock) -> None:
+        for writer in self._writers:
+            writer.write(block)
+
+    def _guard(self, task: Callable[..., None], *arguments: FrameBlock) -> None:
+        """Run a task and keep its error; after one, blocks are only taken, so that `put` cannot wait for ever."""
+        if self._error is None:
             try:
-                for writer in self._writers:
-                    writer.write(block)
+                task(*arguments)
             except BaseException as error:
                 self._error = error
 

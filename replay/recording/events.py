@@ -1,20 +1,20 @@
-"""What begins and what ends in a recording, found from the columns: contacts, bounds, detections, saturation."""
+"""What begins and what ends in a recording: contacts, bounds, detections, saturation; found from the columns."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import Level
-from replay.recording import messages
 from replay.sensing.columns import Detection
 from replay.simulation import FrameBlock, Layout
 
 Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 SEVERITY = {"contact": 4, "undecided": 3, "saturation": 3, "too close": 3, "bounds": 3, "detection": 2}
 """Foxglove's log level of the beginning of each kind of event; the end of any is information (2)."""
@@ -22,17 +22,40 @@ _INFORMATION = 2
 
 
 @dataclass(frozen=True)
-class Event:
-    """One thing that begins or ends.
+class Transition:
+    """What begins or ends, in no particular frame.
 
     Attributes:
-        time: [ns] from the scenario's start.
-        frame: index of the first frame in which it has begun or ended.
         kind: "bounds" (the bounding volumes of a pair meet, whether or not the shapes do), "contact", "undecided",
             "detection", "too close" or "saturation".
         begins: whether it begins; else it ends.
         subject: the pair or the sensor.
         source: the topic that says so.
+    """
+
+    kind: str
+    begins: bool
+    subject: str
+    source: str
+
+    @property
+    def text(self) -> str:
+        """The transition in words."""
+        return f"{self.kind} {'begins' if self.begins else 'ends'}: {self.subject}"
+
+    @property
+    def severity(self) -> int:
+        """Foxglove's log level."""
+        return SEVERITY[self.kind] if self.begins else _INFORMATION
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that begins or ends; see `Transition`.
+
+    Attributes:
+        time: [ns] from the scenario's start.
+        frame: index of the first frame in which it has begun or ended.
     """
 
     time: int
@@ -42,75 +65,126 @@ class Event:
     subject: str
     source: str
 
-    @property
-    def text(self) -> str:
-        """The event in words."""
-        return f"{self.kind} {'begins' if self.begins else 'ends'}: {self.subject}"
 
-    @property
-    def severity(self) -> int:
-        """Foxglove's log level."""
-        return SEVERITY[self.kind] if self.begins else _INFORMATION
+@dataclass(frozen=True, eq=False)
+class Events(Sequence[Event]):
+    """n events, in the order of time, held as columns; an `Event` is made when it is asked for.
 
-    def to_message(self) -> Any:
-        """Return the event as a foxglove.Log: `name` is the subject, `file` the source and `line` the frame."""
-        stamp = {"seconds": self.time // 1_000_000_000, "nanos": self.time % 1_000_000_000}
-        return messages.message_class(messages.LOG)(
-            timestamp=stamp,
-            level=self.severity,
-            message=self.text,
-            name=self.subject,
-            file=self.source,
-            line=self.frame,
-        )
+    Attributes:
+        time: (n,) [ns] from the scenario's start.
+        frame: (n,) index of the first frame in which it has begun or ended.
+        code: (n,) index into `transitions`.
+        transitions: each is different.
+    """
+
+    time: Integers
+    frame: Integers
+    code: Integers
+    transitions: tuple[Transition, ...]
 
     @staticmethod
-    def from_message(time: int, message: Any) -> Event:
-        """Return the event that `to_message` wrote; ValueError when the message is not one."""
-        kind, separator, verb = str(message.message).removesuffix(f": {message.name}").rpartition(" ")
-        if kind not in SEVERITY or not separator or verb not in ("begins", "ends"):
-            raise ValueError(message.message)
-        return Event(time, message.line, kind, verb == "begins", message.name, message.file)
+    def none() -> Events:
+        """Return no events."""
+        empty = np.zeros(0, dtype=np.int64)
+        return Events(empty, empty, empty, ())
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @overload
+    def __getitem__(self, index: int) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> Events: ...
+    def __getitem__(self, index: int | slice) -> Event | Events:
+        if isinstance(index, slice):
+            return Events(self.time[index], self.frame[index], self.code[index], self.transitions)
+        what = self.transitions[self.code[index]]
+        time, frame = int(self.time[index]), int(self.frame[index])
+        return Event(time, frame, what.kind, what.begins, what.subject, what.source)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both hold the same events in the same order."""
+        if not isinstance(other, Events):
+            return NotImplemented
+        mine, theirs = _table(self, other)
+        return bool(np.array_equal(mine, theirs))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def count_missing_in(self, other: Events) -> int:
+        """Return how many of these events the other does not have."""
+        mine, theirs = (rows.view("i8,i8,i8")[:, 0] for rows in _table(self, other))
+        return int((~np.isin(mine, theirs)).sum())
+
+    def columns(self) -> dict[str, NDArray[np.generic]]:
+        """Return time [ns], frame, kind, begins and subject of all events, (n,) each."""
+        return {
+            "time": self.time,
+            "frame": self.frame,
+            "kind": np.array([what.kind for what in self.transitions], dtype=np.str_)[self.code],
+            "begins": np.array([what.begins for what in self.transitions], dtype=np.bool_)[self.code],
+            "subject": np.array([what.subject for what in self.transitions], dtype=np.str_)[self.code],
+        }
+
+
+def _table(a: Events, b: Events) -> tuple[Integers, Integers]:
+    """Return both as rows (n, 3) of time, frame and a code that means the same in both."""
+    common = {what: code for code, what in enumerate(dict.fromkeys((*a.transitions, *b.transitions)))}
+    tables = []
+    for events in (a, b):
+        codes = np.array([common[what] for what in events.transitions], dtype=np.int64)
+        tables.append(np.ascontiguousarray(np.stack([events.time, events.frame, codes[events.code]], axis=1)))
+    return tables[0], tables[1]
 
 
 class EventFinder:
     """Finds the events of blocks given in order; what is already so in the first frame begins there."""
 
     def __init__(self, layout: Layout) -> None:
-        self._layout = layout
+        groups = [
+            ("/collision", layout.pairs, ("bounds", "contact", "undecided")),
+            ("/distance", layout.distance_sensors, ("detection", "too close")),
+            ("/capacitive", layout.capacitive_sensors, ("saturation",)),
+        ]
+        self._first: dict[str, int] = {}
         self._last: dict[str, Flags] = {}
+        self._subjects: list[tuple[str, str, str]] = []
+        for topic, names, kinds in groups:
+            for kind in kinds:
+                self._first[kind] = 2 * len(self._subjects)
+                self._last[kind] = np.zeros(len(names), dtype=np.bool_)
+                for name in names:
+                    self._subjects.append((kind, name, topic if topic == "/collision" else f"{topic}/{name}"))
 
-    def find(self, block: FrameBlock) -> list[Event]:
+    def find(self, block: FrameBlock) -> Events:
         """Return the events of the next block, by frame, and within a frame by kind and name."""
-        events = []
-        for kind, source, names, state in self._states(block):
-            before = self._last.get(kind, np.zeros(len(names), dtype=np.bool_))
-            changed = state != np.concatenate([before[None], state[:-1]])
+        frames, codes = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        for kind, state in _states(block):
+            changed = state != np.concatenate([self._last[kind][None], state[:-1]])
             self._last[kind] = state[-1].copy()
-            for frame, index in np.argwhere(changed).tolist():
-                name = names[index]
-                source_topic = source if kind in ("bounds", "contact", "undecided") else f"{source}/{name}"
-                event = Event(
-                    time=int(block.time[frame]),
-                    frame=block.first + frame,
-                    kind=kind,
-                    begins=bool(state[frame, index]),
-                    subject=name,
-                    source=source_topic,
-                )
-                events.append(event)
-        return sorted(events, key=lambda event: event.frame)
+            frame, index = np.nonzero(changed)
+            frames.append(frame)
+            codes.append(self._first[kind] + 2 * index + state[frame, index])
+        frame = np.concatenate(frames)
+        found, code = np.unique(np.concatenate(codes), return_inverse=True)
+        order = np.argsort(frame, kind="stable")
+        transitions = tuple(self._transition(number) for number in found.tolist())
+        return Events(block.time[frame[order]], block.first + frame[order], code[order], transitions)
 
-    def _states(self, block: FrameBlock) -> Iterator[tuple[str, str, tuple[str, ...], Flags]]:
-        layout = self._layout
-        if block.collision is not None:
-            level = block.collision.level
-            yield "bounds", "/collision", layout.pairs, level >= Level.BOUNDS
-            yield "contact", "/collision", layout.pairs, level >= Level.CONTACT
-            yield "undecided", "/collision", layout.pairs, block.collision.undecided
-        if block.distance is not None:
-            status = block.distance.status
-            yield "detection", "/distance", layout.distance_sensors, status != Detection.NOTHING
-            yield "too close", "/distance", layout.distance_sensors, status == Detection.TOO_CLOSE
-        if block.capacitive is not None:
-            yield "saturation", "/capacitive", layout.capacitive_sensors, block.capacitive.saturated
+    def _transition(self, number: int) -> Transition:
+        kind, subject, source = self._subjects[number // 2]
+        return Transition(kind, number % 2 == 1, subject, source)
+
+
+def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:
+    if block.collision is not None:
+        level = block.collision.level
+        yield "bounds", level >= Level.BOUNDS
+        yield "contact", level >= Level.CONTACT
+        yield "undecided", block.collision.undecided
+    if block.distance is not None:
+        status = block.distance.status
+        yield "detection", status != Detection.NOTHING
+        yield "too close", status == Detection.TOO_CLOSE
+    if block.capacitive is not None:
+        yield "saturation", block.capacitive.saturated

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from replay.collision.columns import Level
 from replay.errors import InvalidValue
-from replay.logs.part_file import PartFile
+from replay.logs.part_file import write_file
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
 from replay.recording.topics import WORLD
@@ -52,14 +52,8 @@ def tables(recording: Recording) -> dict[str, Table]:
         result[f"/distance/{name}"] = {**time, **_distance(recording, sensor)}
     for sensor, name in enumerate(layout.capacitive_sensors if recording.capacitive is not None else ()):
         result[f"/capacitive/{name}"] = {**time, **_capacitive(recording, sensor)}
-    events = recording.events
-    result["/events"] = {
-        "time [ns]": np.array([event.time for event in events], dtype=np.int64),
-        "frame": np.array([event.frame for event in events], dtype=np.int64),
-        "kind": np.array([event.kind for event in events], dtype=np.str_),
-        "begins": np.array([event.begins for event in events], dtype=np.bool_),
-        "subject": np.array([event.subject for event in events], dtype=np.str_),
-    }
+    events = recording.events.columns()
+    result["/events"] = {"time [ns]": events.pop("time"), **events}
     return result
 
 
@@ -102,10 +96,13 @@ def export(
     directory = Path(directory)
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
     if format == "json":
-        return (_write(directory / f"{stem}.json", _json(recording, chosen), overwrite),)
+        return (write_file(directory / f"{stem}.json", _json(recording, chosen), overwrite=overwrite),)
     names = _file_names(stem, chosen, format)
     encode = _csv if format == "csv" else _parquet
-    return tuple(_write(directory / names[t], encode(recording, table), overwrite) for t, table in chosen.items())
+    return tuple(
+        write_file(directory / names[topic], encode(recording, table), overwrite=overwrite)
+        for topic, table in chosen.items()
+    )
 
 
 def _collision(recording: Recording) -> Table:
@@ -210,14 +207,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return "NaN" if np.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
     return value
-
-
-def _write(path: Path, data: bytes, overwrite: bool) -> Path:
-    file = PartFile(path, overwrite=overwrite)
-    try:
-        file.write(data)
-        file.commit()
-    except BaseException:
-        file.discard()
-        raise
-    return path

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from replay.errors import ViewerError
+from replay.logs.part_file import write_file
 from replay.recording.blueprint import TIMELINE
 
 _STARTUP = 60.0  # [s] until the viewer must answer
@@ -53,6 +54,7 @@ def picture(
     Raises:
         ViewerError: the viewer is not installed, cannot render here (it needs a Vulkan driver, such as Debian's
             mesa-vulkan-drivers), cannot read the recording, or does not come to rest in time.
+        WriteError: the picture cannot be written.
     """
     recording, png = Path(recording), Path(png)
     if not recording.is_file():
@@ -74,10 +76,7 @@ def picture(
                 raise ViewerError(f"{recording}: the viewer's picture did not come to rest in {_LOADING:.0f} s")
             time.sleep(_PAUSE)
             pictures = [pictures[-1], viewer.take_screenshot()]
-    try:
-        png.write_bytes(pictures[-1])
-    except OSError as error:
-        raise ViewerError(f"{png}: cannot be written: {error.strerror}") from None
+    write_file(png, pictures[-1])
 
 
 @contextlib.contextmanager

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
-from replay.errors import RecordingError
+from replay.errors import InvalidValue, RecordingError
 from replay.logs.columns import Topic, read_topics
 from replay.logs.mcap_reader import Loss, McapLog
 from replay.numerics import transforms
-from replay.recording.events import Event
+from replay.recording.event_messages import TOPIC as EVENTS
+from replay.recording.event_messages import read_events
+from replay.recording.events import Events
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.topics import (
     CAPACITIVE_FIELDS,
@@ -27,6 +29,9 @@ from replay.sensing.columns import CapacitiveColumns, DistanceColumns
 from replay.simulation import Layout
 
 Floats = NDArray[np.float64]
+
+FRAMES = "/joint_states"
+"""The topic that is in every recording and tells its frames."""
 
 _DTYPES = {
     "level": np.uint8,
@@ -57,7 +62,7 @@ class Recording:
         link_poses: (F, L, 4, 4), T_world_link.
         link_quaternions: (F, L, 4), rotation of T_world_link, xyzw, w >= 0.
         collision, distance, capacitive: see there; None when the scene does not ask for it.
-        events: in the order of time.
+        events: in the order of time, a sequence of `Event`.
         files: the scenario and every file that it needs, by name.
         loss: what a salvaged file has lost, else None.
         lost_frames: frames of the scenario that are not there; 0 unless salvaged.
@@ -73,7 +78,7 @@ class Recording:
     collision: CollisionColumns | None
     distance: DistanceColumns | None
     capacitive: CapacitiveColumns | None
-    events: tuple[Event, ...]
+    events: Events
     files: Mapping[str, bytes]
     loss: Loss | None
     lost_frames: int
@@ -84,20 +89,23 @@ class Recording:
         return self.provenance.layout
 
 
-def read(path: str | Path, *, salvage: bool = False) -> Recording:
+def read(path: str | Path, *, salvage: bool = False, topics: Collection[str] | None = None) -> Recording:
     """Return a recording.
 
     Args:
         path: an MCAP file that `replay` wrote.
         salvage: of a file that was cut or damaged, keep the whole blocks before the damage instead of refusing it;
             `loss` and `lost_frames` then say what is missing.
+        topics: read only these, such as "/collision" or "/distance/left", and take the time and memory of these
+            alone; `layout` then names what was read. All when None.
 
     Raises:
         RecordingError: the file cannot be read, is not a recording, has another format version, or is damaged
             (with `salvage`: so early that nothing can be kept).
+        InvalidValue: the recording has no topic of that name.
     """
     with McapLog(path, salvage=salvage) as log:
-        return _Assembly(log).recording()
+        return _Assembly(log, topics).recording()
 
 
 def read_provenance(log: McapLog) -> Provenance:
@@ -111,22 +119,32 @@ def read_provenance(log: McapLog) -> Provenance:
 class _Assembly:
     """Puts the topics of one recording together."""
 
-    def __init__(self, log: McapLog) -> None:
+    def __init__(self, log: McapLog, wanted: Collection[str] | None) -> None:
         self._log = log
         self._file = str(log.path)
         self._provenance = read_provenance(log)
-        self._layout = self._provenance.layout
         if log.loss is None and not log.checked:
             raise RecordingError(self._file, "damaged: a checksum that every recording has is missing")
         if log.loss is not None and not any(name == "preamble" for name, _ in log.metadata):
             raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
         names = {channel.topic for channel in log.channels.values()}
-        self._topics = read_topics(log, names - {"/scene"}, as_messages={"/events"})
+        self._check_topics(names)
+        chosen = names
+        if wanted is not None:
+            for name in wanted:
+                if name not in names:
+                    raise InvalidValue("topic", name, f"is none of {', '.join(sorted(names))}")
+            chosen = set(wanted)
+            self._provenance = replace(self._provenance, layout=_reduced(self._provenance.layout, chosen))
+        self._layout = self._provenance.layout
+        self._with_events = EVENTS in chosen
+        self._topics = read_topics(log, (chosen | {FRAMES}) - {"/scene", EVENTS})
         self._frames = self._whole_frames()
 
     def recording(self) -> Recording:
         layout, count = self._layout, len(self._frames)
-        joints, tf = self._topic("/joint_states"), self._topic("/tf")
+        joints = self._topic(FRAMES)
+        tf = self._topic("/tf") if layout.links else joints
         positions = [self._column(joints, f"joints[{j}].position") for j in range(len(layout.joints))]
         velocities = [self._column(joints, f"joints[{j}].velocity") for j in range(len(layout.joints))]
         links = range(len(layout.links))
@@ -154,19 +172,28 @@ class _Assembly:
             lost_frames=self._provenance.frames - count,
         )
 
+    def _check_topics(self, names: set[str]) -> None:
+        """Refuse a file without the topics that every recording has, or with some sensors of a kind and not all."""
+        needed = {FRAMES, "/tf", EVENTS}
+        for group in ("distance", "capacitive"):
+            sensors = {f"/{group}/{name}" for name in getattr(self._provenance.layout, f"{group}_sensors")}
+            needed |= sensors if sensors & names else set()
+        missing = ", ".join(map(repr, sorted(needed - names)))
+        if missing:
+            raise RecordingError(self._file, f"damaged: topics are missing: {missing}")
+
     def _whole_frames(self) -> NDArray[np.int64]:
         """Return the times of the frames of whole blocks: those that every topic of the recording has."""
-        per_frame = [topic for name, topic in self._topics.items() if name != "/events"]
-        if not per_frame:
-            raise RecordingError(self._file, "damaged: it has no topics")
+        per_frame = self._topics.values()
+        time = self._topic(FRAMES).time
         count = min(len(topic.time) for topic in per_frame)
         if self._log.loss is not None:
             block = self._provenance.block_frames
             count = count if count == self._provenance.frames else count // block * block
-        time = self._topic("/joint_states").time[:count]
+        time = time[:count]
         for topic in per_frame:
             if not np.array_equal(topic.time[:count], time) or (self._log.loss is None and len(topic.time) != count):
-                raise RecordingError(self._file, f"damaged: topic {topic.name!r} has other frames than /joint_states")
+                raise RecordingError(self._file, f"damaged: topic {topic.name!r} has other frames than {FRAMES}")
         if not bool((np.diff(time) > 0).all()):
             raise RecordingError(self._file, "damaged: its frames are not in the order of time")
         if self._log.loss is None and count != self._provenance.frames:
@@ -203,8 +230,7 @@ class _Assembly:
         return CollisionColumns(**{f: self._column(topic, f, len(self._layout.pairs)) for f in COLLISION_FIELDS})
 
     def _distance(self) -> DistanceColumns | None:
-        topics = [self._topics.get(f"/distance/{name}") for name in self._layout.distance_sensors]
-        present = [topic for topic in topics if topic is not None]
+        present = self._sensors("/distance", self._layout.distance_sensors)
         if not present:
             return None
         columns: dict[str, Any] = {
@@ -214,12 +240,10 @@ class _Assembly:
         for field in DISTANCE_VECTORS:
             vectors = [[self._column(topic, f"{field}.{letter}") for letter in "xyz"] for topic in present]
             columns[field] = np.stack([np.stack(parts, axis=1) for parts in vectors], axis=1)
-        self._all_present(len(present), "distance_sensors")
         return DistanceColumns(**columns)
 
     def _capacitive(self) -> CapacitiveColumns | None:
-        topics = [self._topics.get(f"/capacitive/{name}") for name in self._layout.capacitive_sensors]
-        present = [topic for topic in topics if topic is not None]
+        present = self._sensors("/capacitive", self._layout.capacitive_sensors)
         if not present:
             return None
         columns = {
@@ -229,24 +253,33 @@ class _Assembly:
             )
             for field in CAPACITIVE_FIELDS
         }
-        self._all_present(len(present), "capacitive_sensors")
         return CapacitiveColumns(**columns)
 
-    def _all_present(self, count: int, group: str) -> None:
-        if count != len(getattr(self._layout, group)):
-            raise RecordingError(self._file, f"damaged: its metadata name more {group} than it has topics")
+    def _sensors(self, group: str, sensors: tuple[str, ...]) -> list[Topic]:
+        """Return the topics of a group's sensors, empty when the recording has none of them."""
+        names = [f"{group}/{sensor}" for sensor in sensors]
+        return [self._topics[name] for name in names if name in self._topics]
 
-    def _events(self) -> tuple[Event, ...]:
-        topic = self._topic("/events")
+    def _events(self) -> Events:
+        if not self._with_events:
+            return Events.none()
+        events = read_events(self._log)
         last = int(self._frames[-1]) if len(self._frames) else -1
-        try:
-            return tuple(
-                Event.from_message(time, message)
-                for time, message in zip(topic.time.tolist(), topic.messages or (), strict=True)
-                if time <= last
-            )
-        except ValueError as error:
-            raise RecordingError(self._file, f"damaged: topic '/events' holds {str(error)!r}") from None
+        return events[: int(np.searchsorted(events.time, last, side="right"))]
+
+
+def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
+    """Return the names behind the columns of some topics; those that columns refer to (shapes, objects) all stay."""
+    joints = FRAMES in topics
+    return replace(
+        layout,
+        links=layout.links if "/tf" in topics else (),
+        joints=layout.joints if joints else (),
+        joint_units=layout.joint_units if joints else (),
+        pairs=layout.pairs if "/collision" in topics else (),
+        distance_sensors=tuple(name for name in layout.distance_sensors if f"/distance/{name}" in topics),
+        capacitive_sensors=tuple(name for name in layout.capacitive_sensors if f"/capacitive/{name}" in topics),
+    )
 
 
 def _stack(columns: list[Any], frames: int, *rest: int) -> Any:

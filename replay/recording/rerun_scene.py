@@ -9,7 +9,7 @@ import numpy as np
 
 from replay.numerics import transforms
 from replay.recording import blueprint
-from replay.recording.scene_view import BodyView, Color, Floats, SceneView
+from replay.recording.scene_view import BodyView, Color, Floats, SceneView, indexed
 from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
 
 CONE = (110, 190, 255, 140)
@@ -29,21 +29,32 @@ def log_scene(stream: Any, scene: SceneView, colored: Collection[int]) -> None:
     import rerun as rr
 
     stream.log(blueprint.SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    normals = np.split(corner_normals(scene.meshes), scene.meshes.first_triangle[1:-1])
     for k, body in enumerate(scene.bodies):
-        _log_mesh(stream, body_path(scene, body), body.triangles, None if k in colored else body.color)
+        _log_mesh(stream, body_path(scene, body), body.triangles, normals[k], None if k in colored else body.color)
     for cone in scene.cones:
         lines = rr.LineStrips3D(cone_strips(cone), colors=CONE, radii=rr.Radius.ui_points(0.8))
         stream.log([blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor], lines, static=True)
         beam = [blueprint.SCENE, "closest_points", cone.sensor]
         stream.log(beam, _only(rr.LineStrips3D, colors=BEAM, radii=rr.Radius.ui_points(2.0)), static=True)
         stream.log(beam, _only(rr.Points3D, colors=BEAM, radii=rr.Radius.ui_points(5.0)), static=True)
-    for plate in scene.plates:
-        corners = plate_corners(plate)
-        path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
-        _log_mesh(stream, path, corners[[[0, 1, 2], [0, 2, 3]]], PLATE)
-        outline = rr.LineStrips3D([corners[[0, 1, 2, 3, 0]]], colors=PLATE, radii=rr.Radius.ui_points(1.0))
-        stream.log([*path, "outline"], outline, static=True)
+    _log_plates(stream, scene)
     stream.log(blueprint.SCENARIO, rr.TextDocument(_document(scene), media_type="text/markdown"), static=True)
+
+
+def _log_plates(stream: Any, scene: SceneView) -> None:
+    import rerun as rr
+
+    corners = [plate_corners(plate) for plate in scene.plates]
+    meshes = indexed([four[[[0, 1, 2], [0, 2, 3]]] for four in corners])
+    normals = corner_normals(meshes).reshape(-1, 2, 3, 3)
+    for plate, four, triangles, across in zip(
+        scene.plates, corners, meshes.triangles.reshape(-1, 2, 3, 3), normals, strict=True
+    ):
+        path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
+        _log_mesh(stream, path, triangles, across, PLATE)
+        outline = rr.LineStrips3D([four[[0, 1, 2, 3, 0]]], colors=PLATE, radii=rr.Radius.ui_points(1.0))
+        stream.log([*path, "outline"], outline, static=True)
 
 
 def log_curve(stream: Any, path: Path, name: str) -> None:
@@ -72,13 +83,12 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
     return np.concatenate(boxes or flat or [np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])])
 
 
-def _log_mesh(stream: Any, path: Path, triangles: Floats, color: Color | None) -> None:
+def _log_mesh(stream: Any, path: Path, triangles: Floats, normals: Floats, color: Color | None) -> None:
     import rerun as rr
 
     mesh = rr.Mesh3D(
         vertex_positions=triangles.reshape(-1, 3),
-        triangle_indices=np.arange(3 * len(triangles), dtype=np.uint32).reshape(-1, 3),
-        vertex_normals=corner_normals(triangles).reshape(-1, 3),
+        vertex_normals=normals.reshape(-1, 3),
         albedo_factor=color,  # what is static cannot change later
     )
     stream.log(path, mesh, static=True)

@@ -8,19 +8,19 @@ import numpy as np
 
 from replay.logs.wire import shape_of
 from replay.recording import messages
-from replay.recording.scene_view import BodyView, Floats, SceneView, indexed
+from replay.recording.scene_view import BodyView, Floats, Integers, SceneView
 
 
 def scene_message(scene: SceneView) -> bytes:
     """Return the serialised foxglove.SceneUpdate of a scene."""
     update = messages.message_class(messages.SCENE)()
-    for body in scene.bodies:
-        _add(update, body, scene.links[body.link])
+    for body, (vertices, index) in zip(scene.bodies, map(scene.meshes.body, range(len(scene.bodies))), strict=True):
+        _add(update, body, scene.links[body.link], vertices, index)
     data: bytes = update.SerializeToString(deterministic=True)
     return data
 
 
-def _add(update: Any, body: BodyView, link: str) -> None:
+def _add(update: Any, body: BodyView, link: str, vertices: Floats, index: Integers) -> None:
     entity = update.entities.add(id=body.name, frame_id=link, frame_locked=True)
     entity.timestamp.SetInParent()
     mesh = entity.triangles.add()
@@ -28,7 +28,6 @@ def _add(update: Any, body: BodyView, link: str) -> None:
     mesh.pose.orientation.w = 1.0
     for channel, value in zip("rgba", body.color, strict=True):
         setattr(mesh.color, channel, value / 255)
-    vertices, index = indexed(body.triangles)
     mesh.MergeFromString(_points(mesh, vertices))
     mesh.indices.extend(index.ravel().tolist())
 

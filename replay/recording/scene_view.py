@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from replay.scenario.scene import Scene
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Color = tuple[int, int, int, int]
 """Red, green, blue and opacity, 0 to 255."""
 
@@ -91,12 +93,54 @@ class SceneView:
     plates: tuple[PlateView, ...] = ()
     texts: Mapping[str, str] = field(default_factory=dict)
 
+    @functools.cached_property
+    def meshes(self) -> Meshes:
+        """The bodies' triangles with the vertices that they share."""
+        return indexed([body.triangles for body in self.bodies])
 
-def indexed(triangles: Floats) -> tuple[Floats, NDArray[np.uint32]]:
-    """Return the vertices (v, 3) that triangles (t, 3, 3) share, each once, and the triangles (t, 3) as indices."""
-    flat = triangles.reshape(-1, 3) + 0.0  # -0.0 and 0.0 are one vertex
-    vertices, index = np.unique(flat, axis=0, return_inverse=True)
-    return vertices, index.reshape(-1, 3).astype(np.uint32)
+
+@dataclass(frozen=True, eq=False)
+class Meshes:
+    """The triangles of bodies, all in one, with the vertices that those of one body share.
+
+    Attributes:
+        triangles: (t, 3, 3) [m], body after body.
+        vertices: (v, 3) [m], body after body, sorted.
+        index: (t, 3) into `vertices`.
+        first_triangle, first_vertex: (bodies + 1,) where each body begins, and the end.
+    """
+
+    triangles: Floats
+    vertices: Floats
+    index: Integers
+    first_triangle: Integers
+    first_vertex: Integers
+
+    def body(self, k: int) -> tuple[Floats, Integers]:
+        """Return vertices (v, 3) of a body and its triangles (t, 3) as indices into them."""
+        begin = self.first_vertex[k]
+        index = self.index[self.first_triangle[k] : self.first_triangle[k + 1]] - begin
+        return self.vertices[begin : self.first_vertex[k + 1]], index
+
+
+def indexed(bodies: Sequence[Floats]) -> Meshes:
+    """Return triangles (t, 3, 3) [m] of bodies with each vertex once: all in one pass, because bodies are many."""
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *bodies]) + 0.0  # -0.0 and 0.0 are one vertex
+    counts = [len(body) for body in bodies]
+    corner = triangles.reshape(-1, 3)
+    owner = np.repeat(np.arange(len(bodies)), 3 * np.array(counts, dtype=np.int64))
+    order = np.lexsort((corner[:, 2], corner[:, 1], corner[:, 0], owner))
+    corner, owner = corner[order], owner[order]
+    new = np.ones(len(corner), dtype=np.bool_)
+    new[1:] = (corner[1:] != corner[:-1]).any(axis=1) | (owner[1:] != owner[:-1])
+    index = np.empty(len(corner), dtype=np.int64)
+    index[order] = np.cumsum(new) - 1
+    vertices_of = np.bincount(owner[new], minlength=len(bodies))
+    return Meshes(triangles, corner[new], index.reshape(-1, 3), _begins(counts), _begins(vertices_of))
+
+
+def _begins(counts: Sequence[int] | Integers) -> Integers:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
 def view(scene: Scene) -> SceneView:

@@ -17,7 +17,7 @@ from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import PREAMBLE, RECORD_HEAD, Chunk, Op
 from replay.logs.mcap_writer import McapFileWriter
-from replay.logs.part_file import PartFile
+from replay.logs.part_file import PartFile, write_file
 from replay.recording.provenance import sha256
 from replay.recording.reader import read_provenance
 
@@ -91,9 +91,7 @@ def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
 def _put(data: bytes, objects: Path) -> str:
     digest = sha256(data)
     if not (objects / digest).is_file():
-        file = PartFile(objects / digest, overwrite=True)
-        file.write(data)
-        file.commit()
+        write_file(objects / digest, data)
     return digest
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from replay.numerics import transforms
-from replay.recording.scene_view import ConeView, Floats, PlateView, indexed
+from replay.recording.scene_view import ConeView, Floats, Meshes, PlateView
 
 _CREASE = 0.8
 """Cosine of the angle between two faces below which the edge between them is drawn sharp."""
@@ -15,26 +15,29 @@ _ENDLESS_CONE = 2.0
 """Length [m] that a cone without a range is drawn with."""
 
 
-def corner_normals(triangles: Floats) -> Floats:
-    """Return a unit normal for each corner (t, 3, 3) of triangles: smooth over curved parts, sharp at edges.
+def corner_normals(meshes: Meshes) -> Floats:
+    """Return a unit normal for each corner (t, 3, 3) of meshes: smooth over curved parts, sharp at edges.
 
     A corner takes the area-weighted mean of the normals of those faces at its vertex that lie within about 37 degrees
     of its own face. Each corner meets the others of its vertex by looking ever further along the corners sorted by
     vertex.
     """
+    triangles = meshes.triangles
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    _, index = indexed(triangles)
-    order = np.argsort(index.ravel(), kind="stable")
-    vertex = index.ravel()[order]
-    weighted = np.repeat(across, 3, axis=0)[order]
+    order = np.argsort(meshes.index.ravel(), kind="stable")
+    vertex = meshes.index.ravel()[order]
+    weighted = across[order // 3]
     face = _unit(weighted)
     total = weighted.copy()
-    for step in range(1, min(len(vertex), _MOST_NEIGHBOURS)):
-        near = (vertex[step:] == vertex[:-step]) & (np.sum(face[step:] * face[:-step], axis=1) > _CREASE)
-        if not near.any() and not (vertex[step:] == vertex[:-step]).any():
+    here = np.arange(len(vertex))  # corners whose vertex has another corner `step` places on
+    for step in range(1, _MOST_NEIGHBOURS):
+        here = here[: np.searchsorted(here, len(vertex) - step)]
+        here = here[vertex[here + step] == vertex[here]]
+        if not len(here):
             break
-        total[step:][near] += weighted[:-step][near]
-        total[:-step][near] += weighted[step:][near]
+        near = here[np.sum(face[here + step] * face[here], axis=1) > _CREASE]
+        total[near + step] += weighted[near]
+        total[near] += weighted[near + step]
     result = np.empty_like(total)
     result[order] = _unit(total)
     return result.reshape(-1, 3, 3)

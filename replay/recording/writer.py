@@ -9,6 +9,8 @@ from replay.errors import InvalidValue
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import PartFile
 from replay.recording import messages
+from replay.recording.event_messages import TOPIC as EVENTS
+from replay.recording.event_messages import encode
 from replay.recording.events import EventFinder
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.scene_update import scene_message
@@ -65,6 +67,11 @@ class McapWriter:
         self._topics: list[tuple[FrameTopic, int]] = []
         self._log: McapFileWriter | None = None
         self._event_channel = 0
+        self._scene_data = b""
+
+    def prepare(self) -> None:
+        """Encode the scene; what else comes before the first block depends on it."""
+        self._scene_data = scene_message(self._scene)
 
     def write(self, block: FrameBlock) -> None:
         """Append a block; the first one decides which groups of columns the recording has."""
@@ -73,9 +80,9 @@ class McapWriter:
         events = self._events.find(block)
         self._log.messages(
             self._event_channel,
-            [event.time for event in events],
-            [event.frame for event in events],
-            [event.to_message().SerializeToString(deterministic=True) for event in events],
+            events.time.tolist(),
+            events.frame.tolist(),
+            encode(events),
         )
         for topic, channel in self._topics:
             self._log.rows(topic.encode(block, channel))
@@ -93,6 +100,8 @@ class McapWriter:
         self._file.discard()
 
     def _begin(self, block: FrameBlock) -> McapFileWriter:
+        if not self._scene_data:
+            self.prepare()
         log = McapFileWriter(self._file, f"replay {self._provenance.version}")
         log.metadata(RECORD, self._provenance.to_metadata())
         for name, data in sorted(self._files.items()):
@@ -109,8 +118,8 @@ class McapWriter:
         types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG})
         schemas = {name: log.schema(messages.schema(name)) for name in types}
         scene = log.channel("/scene", schemas[messages.SCENE])
-        self._event_channel = log.channel("/events", schemas[messages.LOG])
+        self._event_channel = log.channel(EVENTS, schemas[messages.LOG])
         self._topics = [(topic, log.channel(topic.name, schemas[topic.type])) for topic in topics]
         log.end_preamble()
-        log.messages(scene, [0], [0], [scene_message(self._scene)])
+        log.messages(scene, [0], [0], [self._scene_data])
         return log

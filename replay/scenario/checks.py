@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from replay.scenario.expectations import DistanceExpectation, PairExpectation
-from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName, matches
+from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
 from replay.scenario.problems import Path, did_you_mean
 from replay.scenario.units import (
     ACCELERATION,
@@ -227,11 +227,8 @@ def _hindrance(names: Names, a: ShapeName, b: ShapeName) -> str | None:
         return f"{(b if a.collides else a).full} has collide: false"
     if names.parents.get(a.link) == b.link or names.parents.get(b.link) == a.link:
         return f"links {a.link!r} and {b.link!r} are joined by a joint"
-    for index, entry in enumerate(names.disable):
-        if entry is None:
-            continue
-        first, second = entry.pair
-        if any(matches(first, x.link, x.name) and matches(second, y.link, y.name) for x, y in ((a, b), (b, a))):
+    for index, first, second in names.disabled:
+        if (a.full in first and b.full in second) or (b.full in first and a.full in second):
             return f"collision.disable[{index}] leaves it out"
     return None
 

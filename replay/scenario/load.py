@@ -8,6 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from replay.errors import Problem, ScenarioError
+from replay.geometry.mesh_file import FORMATS
 from replay.scenario.checks import check
 from replay.scenario.include import Text
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
@@ -189,6 +190,8 @@ def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenanc
             kind, file = body.child("type"), body.child("file")
             if kind is None or kind.value != "mesh" or file is None or not isinstance(file.value, str):
                 continue
+            if not file.value.lower().endswith(FORMATS):
+                continue  # which the shape itself has told
             try:
                 name = resolve_name(file.value, text.names[file.place.file])
                 if name not in provenance.sources:

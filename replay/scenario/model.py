@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, model_validator
 
 from replay.scenario.collision import Collision
-from replay.scenario.expectations import Expectation
+from replay.scenario.expectations import Between, Expectation, PairExpectation
 from replay.scenario.fields import Name, Part, Text, Title, rejected
 from replay.scenario.links import Link
 from replay.scenario.methods import Model, builtin_model
@@ -66,6 +66,15 @@ class Scenario(Fragment):
     def _few_enough_frames(self) -> Self:
         if self.frames > MAX_FRAMES:
             raise rejected(f"makes {self.frames} frames; at most {MAX_FRAMES} are computed", at=("duration",))
+        return self
+
+    @model_validator(mode="after")
+    def _windows_begin_in_time(self) -> Self:
+        for index, expected in enumerate(self.expect):
+            window = expected.contact if isinstance(expected, PairExpectation) else None
+            if isinstance(window, Between) and window.between[0] > self.duration:
+                end = f"{float(self.duration):.6g} s"
+                raise rejected(f"is after the scenario's end at {end}", at=("expect", index, "contact", "between", 0))
         return self
 
     @property

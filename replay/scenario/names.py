@@ -141,6 +141,16 @@ class Names:
         return [self._entry(Disable, "collision", "disable", index) for index in self._list("collision", "disable")]
 
     @cached_property
+    def disabled(self) -> list[tuple[int, frozenset[str], frozenset[str]]]:
+        """Of each disabled pair its index, and the full names of the shapes that its two patterns match."""
+        found = []
+        for index, entry in enumerate(self.disable):
+            if entry is not None:
+                first, second = (frozenset(s.full for s in self.shapes_matching(side)) for side in entry.pair)
+                found.append((index, first, second))
+        return found
+
+    @cached_property
     def expect(self) -> list[PairExpectation | DistanceExpectation | CapacitiveExpectation | None]:
         """Expectations in order."""
         return [self._entry(Expectation, "expect", index) for index in self._list("expect")]

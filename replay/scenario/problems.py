@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from replay.errors import Problem
 from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
 from replay.scenario.node import Node
-from replay.scenario.shapes import Color
+from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
 from replay.scenario.source import dotted, find, locate, problem_at
 
 Path = tuple[str | int, ...]
@@ -118,6 +118,7 @@ _PATTERN_RULES = {
     _pattern_of(Name): NAME_RULE,
     _pattern_of(Title): TITLE_RULE,
     _pattern_of(Color): "must be a colour such as '#b0b4bc'",
+    _pattern_of(MeshFile): MESH_FILE_RULE,
 }
 
 

@@ -44,11 +44,12 @@ def tracks(scenario: Scenario, file: str, data: bytes) -> tuple[dict[str, Track]
     try:
         log = _read(scenario, file, data)
         joints = dict(written.joints) or _same_names(scenario, log)
+        begin = _begin(written.start, log)
     except Unusable as error:
         return found, [scenario.provenance.problem(error.path, error.rule)]
     for joint, source in joints.items():
         try:
-            found[joint] = _track(scenario, joint, source, log)
+            found[joint] = _track(scenario, joint, source, log, begin)
         except Unusable as error:
             problems.append(scenario.provenance.problem(error.path, error.rule))
     return found, problems
@@ -68,9 +69,21 @@ def _read(scenario: Scenario, file: str, data: bytes) -> dict[str, JointTrack]:
         if kind == "mcap":
             return read_mcap(file, data, topic=written.topic or DEFAULT_TOPIC)
         column, unit = (written.time.column, written.time.unit) if written.time else ("time", "s")
-        return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9))
+        needed = {joint.name for joint in written.joints.values()} or set(_scalar_joints(scenario))
+        return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9), needed=needed)
     except RecordingError as error:
         raise Unusable((*PATH, "file"), error.reason) from None
+
+
+def _begin(start: float, log: dict[str, JointTrack]) -> int:
+    """Return the time [ns] of the log's first sample, of whichever joint."""
+    if not log:
+        raise Unusable((*PATH, "file"), "has no samples of joints")
+    begin = min(int(track.time.min()) for track in log.values())
+    end = max(int(track.time.max()) for track in log.values())
+    if begin + start * 1e9 > end:
+        raise Unusable((*PATH, "start"), f"is after the log's last sample, {(end - begin) / 1e9:.6g} s after its first")
+    return begin
 
 
 def _same_names(scenario: Scenario, log: dict[str, JointTrack]) -> dict[str, RecordedJoint]:
@@ -97,7 +110,7 @@ def _scripted(scenario: Scenario, joint: str) -> str:
     return "motion.moves" if any(joint in move.to for move in scenario.motion.moves) else ""
 
 
-def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str, JointTrack]) -> Track:
+def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str, JointTrack], begin: int) -> Track:
     written = scenario.motion.recorded
     assert written is not None
     path = (*PATH, "joints", joint)
@@ -119,7 +132,7 @@ def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str,
         raise Unusable(
             path, f"has a position in the log that is no finite number: sample {_first(~np.isfinite(position))}"
         )
-    seconds = (time - time[0]) / 1e9
+    seconds = (time - begin) / 1e9
     steps = np.diff(time)
     if (steps <= 0).any():
         at = _first(steps <= 0)

@@ -24,6 +24,7 @@ from replay.scenario.load import load_model
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
+from replay.scenario.notes import notes
 from replay.scenario.script import linkage, script, transform
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
@@ -67,7 +68,7 @@ class Scene:
         targets: what sensors sense, sorted by name; none when there are no sensors.
         distance_sensors, capacitive_sensors: sorted by name.
         layout: the names behind the columns of results.
-        notes: what a reader should know about the meshes, one line each.
+        notes: what a reader should know about the scenario and its meshes, one line each.
     """
 
     scenario: Scenario
@@ -87,6 +88,17 @@ class Scene:
     def frames(self) -> int:
         """Number of frames."""
         return self.scenario.frames
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many of what there are, by what people call it."""
+        return {
+            "shapes": len(self.shapes),
+            "triangles": sum(len(shape.solid.triangles) for shape in self.shapes),
+            "pairs": len(self.pairs),
+            "distance_sensors": len(self.distance_sensors),
+            "capacitive_sensors": len(self.capacitive_sensors),
+        }
 
     @property
     def margin(self) -> float:
@@ -125,7 +137,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
     """
     model = load_model(model) if isinstance(model, str | Path) else model or scenario.model
     machine = linkage(scenario)
-    scene_shapes, notes = _shapes(scenario, machine)
+    scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
     sensors = scenario.sensors
     distance = tuple(_distance_sensor(scenario, machine, name) for name in sorted(sensors.distance))
@@ -156,7 +168,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None) -> Sce
         distance_sensors=distance,
         capacitive_sensors=capacitive,
         layout=layout,
-        notes=notes,
+        notes=(*(note.message for note in notes(scenario)), *mesh_notes),
     )
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from replay.geometry.mesh_file import FORMATS
 from replay.scenario.fields import Flag, Part, Pose, Size2, Size3, rejected
 from replay.scenario.units import Aperture, Scale, Size
 
@@ -13,6 +14,12 @@ FINEST_CHORD = 1e-5
 """Smallest chord error as a fraction of the radius: a sphere then has about 0.6 million triangles."""
 
 Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}([0-9a-fA-F]{2})?$")]
+
+
+_MESH_FILE = rf"({'|'.join(''.join(f'[{c}{c.upper()}]' if c != '.' else '[.]' for c in e) for e in FORMATS)})$"
+MESH_FILE_RULE = f"must end in {', '.join(FORMATS[:-1])} or {FORMATS[-1]}; save the mesh as one of these"
+
+MeshFile = Annotated[str, StringConstraints(pattern=_MESH_FILE, max_length=1000)]
 
 
 class ShapePart(Part):
@@ -113,7 +120,7 @@ class Mesh(ShapePart):
     """The triangles of a file."""
 
     type: Literal["mesh"]
-    file: Annotated[str, StringConstraints(min_length=1, max_length=1000)]
+    file: MeshFile
     """Path relative to the file that names it, inside the scenario's folder tree, or package://PYTHON_PACKAGE/path."""
     scale: Scale
     """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -49,11 +50,10 @@ class Sweep(Part):
             raise rejected("needs either grid (all combinations) or list (case by case)")
         count = len(self.list or ())
         if self.grid is not None:
-            count = 1
-            for values in self.grid.values():
-                count *= len(values)
+            count = math.prod(map(len, self.grid.values()))
         if count > MAX_CASES:
-            raise rejected(f"makes {count} cases; at most {MAX_CASES} are run")
+            shown = count if count <= 10**9 else "more than 10^9"
+            raise rejected(f"makes {shown} cases; at most {MAX_CASES} are run")
         return self
 
 

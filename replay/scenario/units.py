@@ -39,6 +39,8 @@ class Dimension:
     @property
     def what_works(self) -> str:
         """What may be written, for messages."""
+        if not any(self.units):
+            return "write a number"
         return f"write a number [{self.si}] or text such as '{self.example}' (units: {', '.join(self.units)})"
 
 

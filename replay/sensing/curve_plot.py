@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from replay.logs.part_file import PartFile
+from replay.logs.part_file import write_file
 
 PANEL_INCHES = (5.2, 3.9)
 _COLORS = ("#1f5fa8", "#c4521a", "#3b7d3b", "#7a4a9c", "#8a6d1c", "#555555")
@@ -68,14 +68,3 @@ def draw(path: Path, panels: Sequence[Panel], *, columns: int = 2, overwrite: bo
     picture = BytesIO()
     figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
     write_file(path, picture.getvalue(), overwrite=overwrite)
-
-
-def write_file(path: Path, data: bytes, *, overwrite: bool) -> None:
-    """Write a whole file, or leave what was there; raises as `draw`."""
-    file = PartFile(path, overwrite=overwrite)
-    try:
-        file.write(data)
-    except BaseException:
-        file.discard()
-        raise
-    file.commit()

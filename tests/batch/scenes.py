@@ -22,6 +22,30 @@ sensors: {{distance: {{tip: {{link: arm, pose: {{xyz: [0, 0, 1], rpy: [0, 90 deg
 expect: [{{pair: [arm, wall], contact: {contact}}}]
 """
 
+MESHES = """
+version: 1
+name: meshes
+rate: 10 Hz
+duration: 2 s
+links:
+  ring: {shapes: {body: {type: mesh, file: ring.stl, scale: 1}}}
+  open: {pose: {xyz: [0, 0, 1]}, shapes: {body: {type: mesh, file: open.stl, scale: 1}}}
+  slide:
+    joint: {type: prismatic, axis: [1, 0, 0], lower: -1, upper: 1, velocity: 1, acceleration: 2}
+    shapes: {ball: {type: mesh, file: ball.stl, scale: 1}, rod: {type: cone, radius: 0.1, height: 0.4}}
+  turn:
+    parent: slide
+    joint: {type: continuous}
+    shapes: {bow: {type: arc, radius: 1, span: 2, width: 0.1, thickness: 0.1}}
+  guest: {joint: {type: free}, shapes: {body: {type: cylinder, radius: 0.2, height: 1}}}
+motion:
+  moves: [{to: {slide: 0.6}}]
+  free: {guest: [{time: 0, xyz: [2, 0, 0]}, {time: 2, xyz: [0, 0, 0.5], rpy: [0, 0, 1]}]}
+sensors:
+  distance: {eye: {link: slide, aperture: 40 deg, range: 2}}
+  capacitive: {guard: {link: slide, plates: {p: {size: [0.1, 0.1]}}, coupling: 10 pF}}
+"""
+
 
 def text(name, *, distance=1.2, duration=1, tag="quick", contact="never"):
     return TEXT.format(name=name, distance=distance, duration=duration, tag=tag, contact=contact)
@@ -29,6 +53,18 @@ def text(name, *, distance=1.2, duration=1, tag="quick", contact="never"):
 
 def scene(name, **values):
     return load_sources(f"{name}.yaml", {f"{name}.yaml": text(name, **values).encode()})
+
+
+def with_meshes():
+    """Every kind of sensor and joint, and a ball that goes into a ring, both from files, one of them with a hole."""
+    import trimesh
+
+    ring, ball = trimesh.creation.annulus(0.3, 0.5, 0.3), trimesh.creation.icosphere(2, 0.1)
+    files = {"ring.stl": ring.export(file_type="stl"), "ball.stl": ball.export(file_type="stl")}
+    ring.update_faces(range(1, len(ring.faces)))
+    return load_sources(
+        "meshes.yaml", {**files, "open.stl": ring.export(file_type="stl"), "meshes.yaml": MESHES.encode()}
+    )
 
 
 def write(folder, name, **values):

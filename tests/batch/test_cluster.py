@@ -74,6 +74,31 @@ def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path
     assert all(result.recordings is None or result.recordings.mcap.is_file() for result in run.results)
 
 
+def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    address, workers = cluster
+
+    def computing():
+        return [child for worker in workers for child in psutil.Process(worker.pid).children(recursive=True)]
+
+    class Impatient(Unwatched):
+        """Asks to stop as soon as one scenario is done, while another hangs."""
+
+        def done(self, result):
+            raise KeyboardInterrupt
+
+    before = computing()
+    scenarios = [scenes.scene("good"), scenes.scene("hang", duration=2), scenes.scene("good_1")]
+    run = run_all(scenarios, tmp_path / "out", rrd=False, execution=Execution(dask=address), watch=Impatient())
+    assert run.interrupted
+    statuses = {result.name: result.status for result in run.results}
+    assert statuses == {"good": Status.PASSED, "hang": Status.INTERRUPTED, "good_1": Status.INTERRUPTED}
+    end = time.monotonic() + 10.0
+    while computing() != before and time.monotonic() < end:
+        time.sleep(0.05)
+    assert computing() == before
+
+
 def test_a_scheduler_that_does_not_answer_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_CONNECT", 1)
     with pytest.raises(WorkerError, match="does not answer"):

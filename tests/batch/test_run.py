@@ -2,10 +2,12 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -14,8 +16,8 @@ from replay.batch.case import Status
 from replay.batch.cost import expected_cost
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.batch.shard import Shard
-from replay.errors import InvalidValue, RecordingExistsError
-from replay.scenario.methods import BUILTIN_MODELS
+from replay.errors import InvalidValue, NoSpaceError, RecordingExistsError
+from replay.scenario.methods import BUILTIN_MODELS, Model
 from tests.batch import scenes
 
 TWO = Execution(workers=2)
@@ -74,17 +76,31 @@ def test_failures_are_told_apart_and_the_others_are_recorded(tmp_path, monkeypat
     assert {process.pid for process in psutil.Process().children(recursive=True)} == before
 
 
+MODELS = {
+    "its own": None,
+    "the thesis's": BUILTIN_MODELS["thesis2015"],
+    "convex pieces by FCL, rays": Model.model_validate(
+        {
+            "collision": {"bounds": "aabb", "narrowphase": "fcl", "pieces": "convex", "clearance": "always"},
+            "distance": {"method": "rays"},
+            "capacitive": {"method": "exact"},
+        }
+    ),
+    "triangles by FCL": Model.model_validate({"collision": {"bounds": "sphere", "narrowphase": "fcl"}}),
+}
+
+
 @pytest.mark.soak
-def test_kernels_are_all_compiled_before_the_first_scenario(tmp_path):
-    """In an empty cache, which takes minutes."""
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_kernels_are_all_compiled_before_the_first_scenario(model, tmp_path):
+    """In an empty cache, which takes half a minute."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    prepare = "PrepareKernels(needs_of([scene('a')], None))(print)"
-    simulate = "[block for block in replay.simulate(scene('a'))]"
+    head = "import pickle, sys, replay; from replay.batch.prepare import PrepareKernels, needs_of\n"
+    head += "scenario, model = pickle.load(sys.stdin.buffer); PrepareKernels(needs_of([scenario], model))(print)\n"
     counts = []
-    for code in (prepare, f"{prepare}; {simulate}"):
-        head = "import replay; from replay.batch.prepare import PrepareKernels, needs_of"
-        head += "; from tests.batch.scenes import scene"
-        subprocess.run([sys.executable, "-c", f"{head}; {code}"], check=True, env=environment, capture_output=True)
+    for code in (head, f"{head}for block in replay.simulate(scenario, model=model): pass"):
+        given = pickle.dumps((scenes.with_meshes(), model))
+        subprocess.run([sys.executable, "-c", code], check=True, env=environment, capture_output=True, input=given)
         counts.append(len(list(tmp_path.rglob("*.nb[ic]"))))
     assert counts[0] == counts[1] > 20
 
@@ -124,6 +140,30 @@ def test_shards_are_all_scenarios_each_once_and_about_equally_long():
     for wrong in ("0/2", "3/2", "1", "a/b"):
         with pytest.raises(InvalidValue, match="must be i/n"):
             Shard.parse(wrong)
+
+
+def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
+    (tmp_path / "bad").write_text("where its folder should be")
+    run = run_all([scenes.scene("bad"), scenes.scene("good")], tmp_path, rrd=False, execution=TWO)
+    bad, good = run.results
+    assert (bad.status, good.status) == (Status.FAILED, Status.PASSED)
+    assert (
+        bad.error
+        == f"{tmp_path / 'bad' / 'log.txt'}: cannot be written: {tmp_path / 'bad'} is a file where a folder is needed"
+    )
+    (tmp_path / "good" / "result.json").unlink()
+    (tmp_path / "good" / "result.json").mkdir()
+    (again,) = run_all([scenes.scene("good")], tmp_path, rrd=False, overwrite=True, execution=TWO).results
+    assert (again.status, again.recordings) == (Status.FAILED, None)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path):
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "result.json").symlink_to("/dev/full")
+    with pytest.raises(NoSpaceError):
+        run_all([scenes.scene("good"), scenes.scene("other")], tmp_path, rrd=False, execution=TWO)
+    assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal as a terminal does")

@@ -105,6 +105,25 @@ def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert (entry["pairs"], entry["triangles"], entry["distance_sensors"]) == (1, 24, 1)
 
 
+def test_an_unusable_mesh_is_invalid_input_and_fails_one_of_many(tmp_path, capsys):
+    (tmp_path / "cut.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n0\n")
+    path = tmp_path / "bad.yaml"
+    path.write_text(
+        "version: 1\nname: bad\nrate: 10\nduration: 1\n"
+        "links: {a: {shapes: {m: {type: mesh, file: cut.ply, scale: 1}}}}\n"
+    )
+    line = f"{path}:5:44: links.a.shapes.m.file = 'cut.ply' cannot be used: is not a usable PLY file: its header"
+    assert run(["validate", str(path)]) is ExitCode.FINE
+    assert run(["validate", "--deep", str(path)]) is ExitCode.INVALID
+    assert capsys.readouterr().err.startswith(f"replay: error: {line}")
+    out = ["-o", str(tmp_path / "out"), "--no-rrd", "--overwrite"]
+    assert run(["run", str(path), *out]) is ExitCode.INVALID
+    assert line in capsys.readouterr().out
+    path.with_name("good.yaml").write_text("version: 1\nname: good\nrate: 10\nduration: 1\nlinks: {a: {}}\n")
+    assert run(["run", str(tmp_path), *out]) is ExitCode.FAILED
+    assert "good: passed" in capsys.readouterr().out
+
+
 def test_info_lists_topics_counts_and_provenance(recorded, capsys):
     assert run(["info", str(recorded / "swing.mcap")]) is ExitCode.FINE
     text = capsys.readouterr().out
@@ -151,7 +170,10 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
     ("arguments", "message"),
     [
         (["run"], "Missing argument"),
-        (["nonsense"], "No such command"),
+        (["nonsense"], "No such command 'nonsense'; run, validate"),
+        (["valdate", "x"], "No such command 'valdate'; did you mean 'validate'?; see replay --help"),
+        (["run", "x", "--workers", "0"], "'0' is no number of processes; write 1 or more; see replay run --help"),
+        (["run", "x", "--shard", "3/2"], "must be i/n with 1 <= i <= n, such as 2/4; see replay run --help"),
         (["info", "none.mcap"], "cannot be read"),
         (["view", "none.rrd"], "no such file"),
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
@@ -162,7 +184,9 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
 )
 def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     assert run(arguments) is ExitCode.INVALID
-    assert message in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.startswith("replay: error: ") and said.count("\n") == 1
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])

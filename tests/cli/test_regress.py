@@ -2,6 +2,9 @@
 
 import json
 import re
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -150,6 +153,75 @@ def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     assert run([*accept, "--yes"]) is ExitCode.INVALID
     assert "interrupted" in capsys.readouterr().err
     assert run(["accept", str(tmp_path), "--baseline", str(base)]) is ExitCode.INVALID
+
+
+INTERRUPTED = """
+import signal, sys, time
+import replay.batch.regress as regress
+from replay.cli.main import main
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+read_pair = regress.read_pair
+
+def slow(baseline, candidate, **rules):
+    if candidate.stem == "b":
+        print("comparing b", flush=True)
+        time.sleep(60)
+    return read_pair(baseline, candidate, **rules)
+
+regress.read_pair = slow
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_request_to_stop_while_comparing_leaves_partial_reports(tmp_path, capsys, number):
+    for name in "abc":
+        scenes.write(tmp_path / "in", name)
+    out, base = tmp_path / "out", tmp_path / "base"
+    assert night(tmp_path, out, "--missing-baseline", "create", "--rrd", "none") is ExitCode.FINE
+    arguments = ["regress", str(tmp_path / "in"), "--baseline", str(base), "-o", str(out), "--workers", "1"]
+    command = [sys.executable, "-c", INTERRUPTED, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "comparing b\n"
+            assert not (out / "index.html").exists()  # that of the night before
+            process.send_signal(number)
+            text, error = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert process.returncode == 130, error
+    assert "Traceback" not in error
+    assert "b: interrupted: the run was ended before it was compared" in text
+    assert "interrupted: the reports are partial" in text
+    assert json.loads((out / "run.json").read_text())["interrupted"] is True
+    assert verdicts_of(out) == {"a": "same", "b": "interrupted", "c": "interrupted"}
+    assert junit_of(out) == {"a": "pass", "b": "error", "c": "error"}
+    assert "Interrupted" in (out / "index.html").read_text()
+    assert len((out / "history.jsonl").read_text().splitlines()) == 1  # no night of the history
+    assert run(["accept", str(out), "--baseline", str(base), "--yes"]) is ExitCode.INVALID
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_request_to_stop_after_the_results_changes_nothing(tmp_path):
+    scenes.write(tmp_path / "in", "a")
+    code = "import atexit, sys, time; from replay.cli.main import main;"
+    code += "atexit.register(lambda: (print('end', flush=True), time.sleep(0.5))); main(sys.argv[1:])"
+    command = [sys.executable, "-c", code, "validate", str(tmp_path / "in")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while process.stdout.readline() != "end\n":
+            assert process.poll() is None
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=20)
+    assert process.returncode == 0
+
+
+def test_a_baseline_folder_that_cannot_be_written_is_told_in_the_reports(tmp_path, capsys):
+    scenes.write(tmp_path / "in", "a")
+    (tmp_path / "base").write_text("where the folder should be")
+    assert night(tmp_path, tmp_path / "out", "--missing-baseline", "create", "--rrd", "none") is ExitCode.FAILED
+    assert f"a: missing baseline: {tmp_path / 'base'}: cannot be written" in capsys.readouterr().out
+    assert junit_of(tmp_path / "out") == {"a": "failure"}
 
 
 def test_rules_beside_the_scenarios_are_the_default(tmp_path):

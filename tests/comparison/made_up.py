@@ -12,6 +12,7 @@ import numpy as np
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
+from replay.recording.events import Events
 from replay.recording.provenance import Provenance, describe
 from replay.recording.reader import Recording
 from replay.recording.scene_view import BodyView, SceneView
@@ -83,7 +84,7 @@ def recording(frames: int = 100, layout: Layout = LAYOUT, name: str = "made_up")
             saturated=np.zeros((frames, plates), dtype=bool),
             touching=np.zeros((frames, plates), dtype=bool),
         ),
-        events=(),
+        events=Events.none(),
         files=FILES,
         loss=None,
         lost_frames=0,

@@ -45,6 +45,13 @@ def disturb(columns):
             values[:] = np.roll(values, 3, axis=0)
 
 
+def alternate(columns, period):
+    """Let one pair touch and let go, and each sensor see and lose, in nearly every frame."""
+    frames = np.arange(FRAMES)
+    columns.collision.level[:, 0] = np.where(frames % period, 2, 1)
+    columns.distance.status[:] = (frames[:, None] // (period - 1) + np.arange(len(LAYOUT.distance_sensors))) % 2
+
+
 def measure(*paths):
     done = subprocess.run([sys.executable, "-c", MEASURE, *map(str, paths)], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
@@ -64,5 +71,14 @@ def test_long_recordings_are_compared_in_bounded_time_and_memory(tmp_path):
     verdict, signals, compared, seconds, peak = measure(baseline, other)
     assert verdict == "different"
     assert signals >= 0.8 * compared
+    assert seconds <= 30.0
+    assert peak <= 1024.0
+    busy = []
+    for period in (2, 3):
+        recording = made_up.recording(FRAMES, LAYOUT)
+        alternate(recording, period)
+        busy.append(made_up.write(recording, tmp_path / f"events_{period}.mcap"))
+    verdict, signals, _, seconds, peak = measure(*busy)
+    assert (verdict, signals) == ("different", 1 + len(LAYOUT.distance_sensors))
     assert seconds <= 30.0
     assert peak <= 1024.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from replay.errors import InvalidValue, MotionLimitError
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
-from replay.kinematics.motion import Keyframe, Move, Script, Waypoint, sample
+from replay.kinematics.motion import Keyframe, Move, Script, Track, Waypoint, plan, sample
 from replay.kinematics.profiles import from_pieces, through_waypoints, trapezoid, trapezoid_time
 from replay.numerics import transforms
 
@@ -169,3 +169,22 @@ def test_waypoint_velocity_is_the_derivative_of_position():
     ahead, behind = profile.sample(seconds + step)[0], profile.sample(seconds - step)[0]
     # central differences: h^2 f'''/6 ~ 1e-12 * 1e3 plus rounding eps/h ~ 1e-9
     np.testing.assert_allclose(profile.sample(seconds)[1], (ahead - behind) / (2 * step), atol=1e-7)
+
+
+@given(cuts=st.lists(st.integers(0, 700), max_size=6))
+def test_a_moment_does_not_depend_on_what_is_sampled_with_it(cuts):
+    """Blocks are sampled one by one, so that memory does not grow with the length of a scenario."""
+    quarter = (0.3, 0.1, math.sin(math.pi / 4), math.cos(math.pi / 4))
+    script = Script(
+        points={"through": tuple(Waypoint(t, t * t, t, 1.0) for t in (0.5, 1.25, 3.0))},
+        moves=(Move({"hinge": 1.0}, start=0.3), Move({"hinge": -0.5}, speed=0.4)),
+        free={"body": (Keyframe(1.0, (0, 0, 0), (0, 0, 0, 1)), Keyframe(5.0, (2, 4, 1), quarter))},
+        recorded={"logged": Track(np.arange(8.0), np.sin(np.arange(8.0)))},
+    )
+    joints = [hinge(velocity=1.0, acceleration=2.0), hinge("through"), hinge("logged"), hinge("still")]
+    motion = plan(linkage(*joints, Joint("body", JointType.FREE)), script)
+    seconds = np.arange(700) / 90.0
+    whole = motion.states(seconds)
+    parts = [motion.states(part) for part in np.split(seconds, sorted(cuts))]
+    for name in ("positions", "velocities", "free_poses"):
+        assert np.concatenate([getattr(part, name) for part in parts]).tobytes() == getattr(whole, name).tobytes()

@@ -29,7 +29,8 @@ def package(tmp_path):
         (root / room).mkdir(parents=True)
         (root / room / "__init__.py").write_text("")
     (root / "__init__.py").write_text("")
-    shutil.copy(Path(replay.__file__).parent / "numerics" / "jit.py", root / "numerics" / "jit.py")
+    for module in ("jit.py", "announcement.py"):
+        shutil.copy(Path(replay.__file__).parent / "numerics" / module, root / "numerics" / module)
     (root / "geometry" / "callee.py").write_text(CALLEE.format("1.0"))
     (root / "collision" / "caller.py").write_text(CALLER)
     return root
@@ -58,6 +59,13 @@ def test_compiled_code_is_reused_while_nothing_changes(package, tmp_path):
     hits = "outer(1.0); print(sum(outer.stats.cache_hits.values()))"
     assert run(package, hits, **cache) == "0"
     assert run(package, hits, **cache) == "1"
+
+
+def test_compiling_is_announced_and_loading_is_not(package, tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    code = "import replay.numerics.announcement as a; a.announce_by(print); a._announcement._left = 0.0; outer(1.0)"
+    assert run(package, code, **cache) == "compiling kernels; this takes about a minute, once"
+    assert run(package, code, **cache) == ""
 
 
 def test_numba_cache_dir_is_honoured(package, tmp_path):

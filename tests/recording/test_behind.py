@@ -49,6 +49,9 @@ class Failing:
         self.blocks = 0
         self.log: list[str] = []
 
+    def prepare(self) -> None:
+        pass
+
     def write(self, block: FrameBlock) -> None:
         self.blocks += 1
         if self.blocks == 3:

@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 from replay.errors import RecordingExistsError, ViewerError
 from replay.recording.picture import picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
+from replay.recording.scene_view import indexed
 from replay.recording.surfaces import cone_strips, corner_normals
 from tests.recording import moving
 
@@ -115,9 +116,9 @@ def test_normals_are_smooth_on_a_barrel_and_sharp_on_a_box() -> None:
     box = moving.box((1, 2, 3), (0, 0, 0))
     across = np.cross(box[:, 1] - box[:, 0], box[:, 2] - box[:, 0])
     face = across / np.linalg.norm(across, axis=1, keepdims=True)
-    assert np.allclose(corner_normals(box), face[:, None])
+    assert np.allclose(corner_normals(indexed([box])), face[:, None])
     barrel = moving.barrel(0.2, 1.0)
-    normals = corner_normals(barrel)
+    normals = corner_normals(indexed([barrel]))
     side = np.abs(normals[..., 1]) < 0.5
     radial = barrel[..., [0, 2]] / 0.2
     assert np.allclose(normals[side][:, [0, 2]], radial[side], atol=np.pi / 32)  # half a segment

@@ -173,7 +173,7 @@ def test_scenes_without_sensors_pairs_or_joints_come_back(tmp_path: Path) -> Non
     recording = read(tmp_path / "bare.mcap")
     assert recording.joint_positions.shape == (3, 0)
     assert recording.collision is None and recording.distance is None and recording.capacitive is None
-    assert recording.events == ()
+    assert list(recording.events) == []
 
 
 def test_blocks_too_large_for_a_chunk_are_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path) -> None:

@@ -13,7 +13,7 @@ HEAD = "version: 1\nname: a\nrate: 60 Hz\nduration: 1 s\n"
 @pytest.fixture
 def body_package(tmp_path, monkeypatch):
     folder = tmp_path / "site" / "body_package_of_this_test"
-    (folder / "data").mkdir(parents=True)
+    (folder / "data" / "all.stl").mkdir(parents=True)
     (folder / "__init__.py").write_text("raise RuntimeError('imported')\n")
     (folder / "data" / "body.stl").write_bytes(b"mesh")
     (folder / "data" / "out.stl").symlink_to(__file__)
@@ -38,8 +38,9 @@ def test_a_package_is_found_and_not_imported(tmp_path, body_package):
     ("file", "reason"),
     [
         ("package://{}/data/bodi.stl", "does not exist in the package '{}'; did you mean 'body.stl'?"),
-        ("package://{}/data", "is a folder; name a file"),
+        ("package://{}/data/all.stl", "is a folder; name a file"),
         ("package://{}/data/out.stl", "is a link that leads out of the package '{}'"),
+        ("package://{}/data", "must end in .stl, .obj, .ply or .glb; save the mesh as one of these"),
         ("package://{}/../x.stl", "is not of the form package://PYTHON_PACKAGE/path/inside/it"),
         ("package://nobody_has_this/x.stl", "needs the Python package 'nobody_has_this', which is not installed; "
          "get it with: pip install nobody_has_this"),

@@ -116,6 +116,10 @@ def test_a_csv_moves_the_joints_and_empty_cells_are_no_samples(tmp_path):
     rows = "".join(f"{s * 1e3},{a},{z}\n" for s, a, z in zip(SECONDS, SWING, LIFT, strict=True))
     table = "t_ms,swing,lift\n" + rows.replace("300.0,10.0,0.1\n", "300.0,10.0,0.1\n400.0,,0.1\n")
     motion = "{recorded: {file: log.csv, time: {column: t_ms, unit: ms}, joints: {swing: {name: swing, unit: deg}}}}"
+    table = (
+        table.replace("swing,lift\n", "swing,lift,remark\n").replace(",0.4\n", ",0.4,up\n").replace("0.1\n", "0.1,\n")
+    )
+    table = table.replace("0.0\n", "0.0,\n").replace("0.2\n", "0.2,down\n")  # a column of text is of no concern
     got = positions(load(tmp_path, motion, {"log.csv": table.encode()}))
     np.testing.assert_allclose(got[:, 1], EXPECTED[:, 1], atol=ATOL)
     assert not got[:, 0].any()
@@ -126,6 +130,13 @@ def test_start_shifts_the_log_and_joints_of_the_same_name_need_no_mapping(tmp_pa
     got = positions(load(tmp_path, motion, {"robot.mcap": log("cdr")}))
     np.testing.assert_allclose(got[:, 0], np.interp(FRAMES + 0.9, SECONDS, LIFT), atol=ATOL)
     assert not got[:, 1].any()  # the log has no joint `swing`
+
+
+def test_joints_that_begin_later_keep_their_times(tmp_path):
+    table = b"time,swing,lift\n10,,0\n11,0,0\n12,1,0.5\n"
+    got = positions(load(tmp_path, "{recorded: {file: log.csv}}", {"log.csv": table}))
+    np.testing.assert_allclose(got[:, 0], np.interp(FRAMES, [0, 1, 2], [0, 0, 0.5]), atol=ATOL)
+    np.testing.assert_allclose(got[:, 1], np.interp(FRAMES, [1, 2], [0, 1]), atol=ATOL)
 
 
 def test_a_recording_of_replay_moves_the_joints_as_they_were_recorded(tmp_path):
@@ -182,6 +193,8 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
         ),
         ("{recorded: {file: log.csv}}", {"log.csv": b"\xff\xfe"}, "cannot be read as CSV"),
         ("{recorded: {file: log.csv}}", {"log.csv": b""}, "has no column 'time'"),
+        ("{recorded: {file: log.csv, joints: {swing: {name: swing}}}}", {"log.csv": b"time,swing\n"}, "no samples"),
+        ("{recorded: {file: log.csv, start: 2 s}}", {}, "is after the log's last sample, 0.5 s after its first"),
     ],
 )
 def test_what_a_log_cannot_tell_is_refused_with_its_place(tmp_path, motion, files, message):

@@ -1,0 +1,119 @@
+"""Whether a GLB file is whole, and whether all of its triangles would be read, told before they are."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Any
+
+_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
+"""Extensions that change what a body looks like and not where it is."""
+_FAN = 6
+
+
+def check(data: bytes) -> int:
+    """Return 0: how many triangles there are is known only when the scene has been put together.
+
+    Raises:
+        ValueError: the file is cut or not glTF 2, or its geometry is kept in a way that would not be read.
+    """
+    scene, binary = _chunks(data)
+    try:
+        _check_extensions(scene)
+        _check_buffers(scene, binary)
+        _check_geometry(scene)
+        _check_nodes(scene)
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise ValueError(f"its description is not glTF 2 ({type(error).__name__}: {error})") from None
+    return 0
+
+
+def _chunks(data: bytes) -> tuple[dict[str, Any], int]:
+    """Return the description of the scene, and how many bytes of binary data come with it."""
+    if data[:4] != b"glTF" or len(data) < 20:
+        raise ValueError("it does not begin as one")
+    version, length, size, kind = struct.unpack("<4I", data[4:20])
+    if version != 2:
+        raise ValueError(f"it is of glTF version {version}; version 2 is read")
+    if length > len(data):
+        raise ValueError(f"its header announces {length} bytes; the file has {len(data)}")
+    if kind != _JSON or 20 + size > len(data):
+        raise ValueError("it does not begin with a whole description of its scene")
+    try:
+        scene = json.loads(data[20 : 20 + size])
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"the description of its scene is damaged: {error}") from None
+    if not isinstance(scene, dict):
+        raise ValueError("the description of its scene is damaged: it is no JSON object")
+    rest = data[20 + size :]
+    while len(rest) >= 8:
+        size, kind = struct.unpack("<2I", rest[:8])
+        if 8 + size > len(rest):
+            raise ValueError(f"a part of it announces {size} bytes; {len(rest) - 8} follow")
+        if kind == _BINARY:
+            return scene, size
+        rest = rest[8 + size :]
+    return scene, 0
+
+
+def _check_extensions(scene: dict[str, Any]) -> None:
+    needed = [name for name in scene.get("extensionsRequired", ()) if not name.startswith(_HARMLESS)]
+    needed += [name for name in scene.get("extensionsUsed", ()) if name == "EXT_mesh_gpu_instancing"]
+    if needed:
+        raise ValueError(f"it needs the extension {needed[0]}, which is not read; export it without compression")
+
+
+def _check_buffers(scene: dict[str, Any], binary: int) -> None:
+    """Check that all numbers are in the file: where they are not, trimesh fills in zeros, as many as announced."""
+    for buffer in scene.get("buffers", ()):
+        if not buffer.get("uri", "data:").startswith("data:"):
+            raise ValueError(f"its data are in another file, {buffer['uri'][:60]!r}; save it as one GLB file")
+    views = scene.get("bufferViews", [])
+    for number, view in enumerate(views):
+        inside = "uri" not in scene["buffers"][view["buffer"]]
+        if view["byteLength"] < 0 or (inside and view.get("byteOffset", 0) + view["byteLength"] > binary):
+            raise ValueError(f"buffer view {number} is beyond the {binary} bytes of its data")
+    for number, accessor in enumerate(scene.get("accessors", ())):
+        row = _COMPONENT_BYTES[accessor["componentType"]] * _COMPONENTS[accessor["type"]]
+        if "bufferView" in accessor:
+            view = views[accessor["bufferView"]]
+            stride = view.get("byteStride", row)
+            room = view["byteLength"] - accessor.get("byteOffset", 0)
+        else:
+            stride, room = row, binary  # a sparse one, which the zeros of its full size are made for
+        if not 0 <= (accessor["count"] - 1) * stride + row <= room:
+            raise ValueError(f"accessor {number} announces {accessor['count']} entries, more than its data hold")
+
+
+def _check_geometry(scene: dict[str, Any]) -> None:
+    for mesh in scene.get("meshes", ()):
+        for primitive in mesh["primitives"]:
+            if primitive.get("mode") == _FAN:
+                raise ValueError("it holds triangle fans, which are not read; save it as triangles")
+            used = [primitive["attributes"]["POSITION"], *([primitive["indices"]] if "indices" in primitive else [])]
+            for accessor in (scene["accessors"][index] for index in used):
+                if "sparse" in accessor or "bufferView" not in accessor:
+                    raise ValueError("it keeps corners in sparse or compressed form, which is not read")
+
+
+def _check_nodes(scene: dict[str, Any]) -> None:
+    """Check that the nodes form trees of finite transforms: of a node with two parents only one place is read."""
+    nodes = scene.get("nodes", [])
+    parent: dict[int, int] = {}
+    for number, node in enumerate(nodes):
+        values = [x for key in ("matrix", "translation", "rotation", "scale") for x in node.get(key, ())]
+        if not all(math.isfinite(x) for x in values):
+            raise ValueError(f"node {number} has a transform that is not finite")
+        for child in node.get("children", ()):
+            if child in parent or not 0 <= child < len(nodes):
+                raise ValueError(f"node {child} is not there, or has two parents")
+            parent[child] = number
+    reached = [number for number in range(len(nodes)) if number not in parent]
+    for number in reached:
+        reached.extend(nodes[number].get("children", ()))
+    if len(reached) < len(nodes):
+        raise ValueError("a node is within itself")

@@ -1,0 +1,147 @@
+"""Events to messages of `/events` (foxglove.Log) and back.
+
+A message is three parts one after another: the time, what happens, and the frame. What happens repeats, so each of its
+texts goes through the protobuf library once; a message is then two cuts and a look-up, which is what makes a recording
+with events in every frame readable in seconds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from google.protobuf.message import DecodeError
+
+from replay.errors import RecordingError
+from replay.logs.mcap_reader import McapLog
+from replay.logs.protobuf import message_type
+from replay.recording import messages
+from replay.recording.events import SEVERITY, Events, Transition
+
+TOPIC = "/events"
+
+_TIME_TAG = 0x0A  # field 1, a message
+_LINE_TAG = 0x35  # field 6, four bytes, little-endian
+_LINE_BYTES = 5
+
+
+def encode(events: Events) -> list[bytes]:
+    """Return the messages; `name` is the subject, `file` the source and `line` the frame."""
+    log = messages.message_class(messages.LOG)
+    bodies = [_body(log, what) for what in events.transitions]
+    head = tail = b""
+    current = (-1, -1)
+    found = []
+    for time, frame, code in zip(events.time.tolist(), events.frame.tolist(), events.code.tolist(), strict=True):
+        if (time, frame) != current:
+            current = time, frame
+            stamp = {"seconds": time // 1_000_000_000, "nanos": time % 1_000_000_000}
+            head = log(timestamp=stamp).SerializeToString(deterministic=True)
+            tail = log(line=frame).SerializeToString(deterministic=True)
+        found.append(head + bodies[code] + tail)
+    return found
+
+
+def read_events(log: McapLog) -> Events:
+    """Return the events of a recording.
+
+    Raises:
+        RecordingError: damage, there is no such topic, or it holds a message that is no event.
+    """
+    channels = [channel for channel in log.channels.values() if channel.topic == TOPIC]
+    if len(channels) != 1:
+        raise RecordingError(str(log.path), f"damaged: topic {TOPIC!r} is missing or spread over several channels")
+    number = channels[0].id
+    decoder = _Decoder(log, channels[0].schema_id)
+    times, frames, codes = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
+    for chunk in log.chunks_with((number,)):
+        for run in log.runs(chunk):
+            if run.channel == number:
+                found = np.array([decoder.decode(message) for message in run.messages()], dtype=np.int64)
+                times.append(run.time)
+                frames.append(found[:, 0])
+                codes.append(found[:, 1])
+    events = Events(np.concatenate(times), np.concatenate(frames), np.concatenate(codes), decoder.transitions)
+    if log.count_of(number) not in (None, len(events)):
+        raise RecordingError(
+            str(log.path), f"damaged: topic {TOPIC!r} holds {len(events)} messages, not as many as counted"
+        )
+    return events
+
+
+class _Decoder:
+    """Turns messages into frames and codes of transitions."""
+
+    def __init__(self, log: McapLog, schema_id: int) -> None:
+        self._file = str(log.path)
+        schema = log.schemas.get(schema_id)
+        if schema is None or schema.name != messages.LOG or schema.encoding != "protobuf":
+            raise RecordingError(self._file, f"damaged: topic {TOPIC!r} does not hold {messages.LOG}")
+        self._ours = schema == messages.schema(messages.LOG)
+        self._type: Any = message_type(self._file, schema.name, schema.data)
+        self._bodies: dict[bytes, int] = {}
+        self._codes: dict[Transition, int] = {}
+
+    @property
+    def transitions(self) -> tuple[Transition, ...]:
+        """What the codes mean."""
+        return tuple(self._codes)
+
+    def decode(self, message: bytes) -> tuple[int, int]:
+        """Return frame and code of a message; RecordingError when it is no event.
+
+        A protobuf message that is cut between its fields means the same as its parts put together, so that whatever
+        is cut here rightly is read rightly; what does not look like three parts is read as a whole.
+        """
+        body = frame = None
+        if self._ours and len(message) > 1 and message[0] == _TIME_TAG and message[1] < 0x80:
+            body, frame = _cut(message)
+            code = self._bodies.get(body)
+            if code is not None:
+                return frame, code
+        found = self._parse(message)
+        what = _transition(found)
+        if what is None:
+            raise RecordingError(self._file, f"damaged: topic {TOPIC!r} holds {found.message!r}")
+        code = self._codes.setdefault(what, len(self._codes))
+        if body is not None and found.line == frame and self._alone(body) == what:
+            self._bodies[body] = code
+        return found.line, code
+
+    def _parse(self, data: bytes) -> Any:
+        try:
+            return self._type.FromString(data)
+        except DecodeError as error:
+            raise RecordingError(
+                self._file, f"topic {TOPIC!r} holds a message that its schema cannot read: {error}"
+            ) from None
+
+    def _alone(self, body: bytes) -> Transition | None:
+        """Return what a body means by itself; None when it is no whole message, or says time or frame too."""
+        try:
+            found = self._type.FromString(body)
+        except DecodeError:
+            return None
+        return None if found.line or found.HasField("timestamp") else _transition(found)
+
+
+def _cut(message: bytes) -> tuple[bytes, int]:
+    """Return what seems to be the middle part of a message, and the frame that seems to follow it (0 if none does)."""
+    begin, end = 2 + message[1], len(message) - _LINE_BYTES
+    if end >= begin and message[end] == _LINE_TAG:
+        return message[begin:end], int.from_bytes(message[end + 1 :], "little")
+    return message[begin:], 0
+
+
+def _body(log: Any, what: Transition) -> bytes:
+    body: bytes = log(level=what.severity, message=what.text, name=what.subject, file=what.source).SerializeToString(
+        deterministic=True
+    )
+    return body
+
+
+def _transition(found: Any) -> Transition | None:
+    kind, separator, verb = str(found.message).removesuffix(f": {found.name}").rpartition(" ")
+    if kind not in SEVERITY or not separator or verb not in ("begins", "ends"):
+        return None
+    return Transition(kind, verb == "begins", found.name, found.file)

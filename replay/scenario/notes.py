@@ -1,0 +1,61 @@
+"""What a reader should know of a scenario although it is valid: what its end cuts off, and logs that end before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from replay.errors import Problem
+from replay.scenario.expectations import Between, PairExpectation
+
+if TYPE_CHECKING:
+    from replay.scenario.model import Scenario
+
+
+def notes(scenario: Scenario) -> list[Problem]:
+    """Return the notes on a scenario, each with its place."""
+    end = float(scenario.duration)
+    after = f"after the scenario's end at {end:.6g} s"
+    problem = scenario.provenance.problem
+    found = []
+    times = {("points", joint): [point.time for point in points] for joint, points in scenario.motion.points.items()}
+    times |= {("free", joint): [key.time for key in keys] for joint, keys in scenario.motion.free.items()}
+    for (kind, joint), seconds in times.items():
+        late = [index for index, time in enumerate(seconds) if time > end]
+        if late:
+            more = f", and {len(late) - 1} more" if len(late) > 1 else ""
+            found.append(problem(("motion", kind, joint, late[0], "time"), f"is {after}{more}"))
+    for index, moved_until in _late_moves(scenario, end):
+        found.append(problem(("motion", "moves", index), f"ends at {moved_until:.6g} s, {after}"))
+    found.extend(_short_logs(scenario))
+    for index, expected in enumerate(scenario.expect):
+        window = expected.contact if isinstance(expected, PairExpectation) else None
+        if isinstance(window, Between) and window.between[1] > end:
+            found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    return found
+
+
+def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
+    """Yield the last move of each joint that still moves at the end, and when it ends [s]."""
+    from replay.kinematics.motion import joint_profiles
+    from replay.scenario.script import linkage, script
+
+    moves = scenario.motion.moves
+    profiles = joint_profiles(linkage(scenario), script(scenario)) if moves else {}
+    late: dict[int, float] = {}
+    for joint in {name for move in moves for name in move.to}:
+        seconds = max(profiles[joint].end, default=0.0)
+        if seconds > end + 1e-9:
+            index = max(index for index, move in enumerate(moves) if joint in move.to)
+            late[index] = max(seconds, late.get(index, 0.0))
+    yield from sorted(late.items())
+
+
+def _short_logs(scenario: Scenario) -> Iterator[Problem]:
+    last = float(Fraction(scenario.frames - 1) / Fraction(scenario.rate))
+    ends = {joint: track.seconds[-1] for joint, track in sorted(scenario.provenance.tracks.items())}
+    short = [f"{joint} at {seconds:.6g} s" for joint, seconds in ends.items() if seconds < last - 1e-9]
+    if short:
+        rule = f"ends before the scenario's last frame at {last:.6g} s: {', '.join(short)}; the last positions hold"
+        yield scenario.provenance.problem(("motion", "recorded", "file"), rule)
