@@ -16,6 +16,7 @@ from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Plot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import sphere
+from replay.geometry.wide_tree import widen
 from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact
@@ -98,9 +99,9 @@ def on_mesh(name: str, triangles: Floats, *, queries: int, counts: Sequence[int]
 def exact_sweep(target: Target) -> Sweep:
     """Return our exact sensor on a target."""
     cos_half, sin_half = half_angle(APERTURE)
-    counts = np.zeros(COUNTS, dtype=np.int64)
+    tree, counts = widen(target.tree, target.triangles), np.zeros(COUNTS, dtype=np.int64)
     return lambda poses, nearest: sweep_exact(
-        target.triangles, target.tree, poses, cos_half, sin_half, np.inf, 0, nearest, counts
+        target.triangles, tree, poses, cos_half, sin_half, np.inf, 0, nearest, counts
     )
 
 
