@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from replay.errors import ReplayError, ScenarioError
 from replay.recording.record import Progress, RecordedPaths
+from replay.scenario.covered import CoveredSensors
 from replay.scenario.verdict import ExpectationCheck, Outcome
 
 if TYPE_CHECKING:
@@ -131,7 +132,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check = scene.expectation_check()
-        blocks = _checked(simulation.blocks(), check)
+        covered = CoveredSensors(scene.layout)
+        blocks = _checked(simulation.blocks(), check, covered)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -146,7 +148,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=scene.notes,
+        notes=(*scene.notes, *covered.notes()),
     )
 
 
@@ -163,7 +165,8 @@ def describe(result: CaseResult) -> list[str]:
     return lines
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
+def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, covered: CoveredSensors) -> Iterator[FrameBlock]:
     for block in blocks:
+        covered.update(block.distance)
         check.update(block.time, block.collision, block.distance, block.capacitive)
         yield block

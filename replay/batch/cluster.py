@@ -129,7 +129,7 @@ def _unpacked(task: Task, future: Any) -> Ended:
     try:
         parcel: Parcel = future.result()
     except Exception as error:  # the machine that ran it is gone too often, or replay is not installed there
-        return Ended(task, Ending.CRASHED, None, f"crashed: on the cluster: {error}", 0.0, 0)
+        return Ended(task, Ending.CRASHED, None, f"on the cluster: {error}", 0.0, 0)
     folder = task.payload.folder
     try:
         for name, data in parcel.files.items():

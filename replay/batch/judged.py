@@ -14,6 +14,8 @@ from replay.comparison.runs import Case
 
 INDEX, JUNIT = "index.html", "junit.xml"
 """Names of the reports in a run folder."""
+LOG = "log.txt"
+"""Name of the file in a scenario's folder that holds what it said."""
 OVERLAY = "{name}.difference.rrd"
 """Name of the recording that shows both runs of a scenario."""
 
@@ -57,7 +59,7 @@ class Judged:
         result: of its run; None when it was skipped.
         comparison: with its baseline; None when there was none to make.
         drawings: of its signals that differ.
-        source: file that it was read from, as the user named it; "" when that is not known.
+        source: file that it was read from, as the user named it.
     """
 
     name: str

@@ -161,12 +161,12 @@ class Pool:
                         case Finished(value):
                             yield worker.ended(Ending.DONE, value=value)
                         case Raised(text):
-                            yield worker.ended(Ending.CRASHED, f"crashed: {text}")
+                            yield worker.ended(Ending.CRASHED, text)
                         case None:
                             workers.remove(worker)
                             worker.stop()
                             if worker.task is not None:
-                                yield worker.ended(Ending.CRASHED, f"crashed: {worker.cause_of_death()}")
+                                yield worker.ended(Ending.CRASHED, worker.cause_of_death())
                             else:
                                 failed_starts += 1
                                 if failed_starts == _FAILED_STARTS:

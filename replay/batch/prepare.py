@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from replay.scenario.methods import Model
+from replay.scenario.methods import CapacitiveMethod, DistanceMethod, Model
 from replay.scenario.model import Scenario
 
 _SCENE = b"""
@@ -54,7 +54,7 @@ f 1 2 8\nf 1 8 7\nf 2 3 9\nf 2 9 8\nf 3 4 10\nf 3 10 9\nf 4 5 11\nf 4 11 10\nf 5
 
 @dataclass(frozen=True)
 class Needs:
-    """What scenarios compute, and by which methods; limits that do not change what is compiled are left out."""
+    """What scenarios compute, and by which methods; numbers that do not change what is compiled are left out."""
 
     model: Model
     collision: bool
@@ -67,7 +67,7 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
     """Return what scenarios need, each combination once."""
     needs = (
         Needs(
-            model or scenario.model,
+            _methods(model or scenario.model),
             collision=scenario.collision.pairs == "all",
             distance=bool(scenario.sensors.distance),
             capacitive=bool(scenario.sensors.capacitive),
@@ -76,6 +76,13 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
         for scenario in scenarios
     )
     return tuple(dict.fromkeys(needs))
+
+
+def _methods(model: Model) -> Model:
+    distance = DistanceMethod(method=model.distance.method, engine=model.distance.engine)
+    return Model(
+        collision=model.collision, distance=distance, capacitive=CapacitiveMethod(method=model.capacitive.method)
+    )
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,7 @@ def regress(
         for scenario, result in zip(selection.chosen, run.results, strict=True)
     ]
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
+    ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
     unused = sorted(set(accepted.names()) - {item.name for item in ended})
     return Regression(run, baseline, rules_file, model_name, tuple(ended), tuple(unused))
 
@@ -110,12 +111,8 @@ def _unjudged(scenario: Scenario, result: CaseResult) -> Judged:
     """Return the verdict of a scenario that has not been compared, because it failed or the run was ended."""
     if result.status.recorded:
         message = "the run was ended before it was compared"
-        return Judged(scenario.name, Verdict.INTERRUPTED, message, result, source=_source(scenario))
-    return Judged(scenario.name, Verdict(result.status.value), result.error, result, source=_source(scenario))
-
-
-def _source(scenario: Scenario) -> str:
-    return scenario.main_source if scenario.provenance.root is None else scenario.provenance.root.place.file
+        return Judged(scenario.name, Verdict.INTERRUPTED, message, result)
+    return Judged(scenario.name, Verdict(result.status.value), result.error, result)
 
 
 def _created(judged: Mapping[str, Judged], accepted: Baseline) -> dict[str, Judged]:
@@ -170,7 +167,7 @@ def _judge(
     if result.status is Status.BROKEN and verdict is not Verdict.UNREADABLE:
         broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
         verdict, message = Verdict.BROKEN, "; ".join([*broken, *([message] if message else [])])
-    return Judged(scenario.name, verdict, message, result, comparison, drawings, _source(scenario))
+    return Judged(scenario.name, verdict, message, result, comparison, drawings)
 
 
 def _overlay(folder: Path, comparison: Case, pair: Pair) -> str:

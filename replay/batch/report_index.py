@@ -13,11 +13,13 @@ from typing import Any
 from urllib.parse import quote
 
 import replay
-from replay.batch.judged import OVERLAY, Judged, Regression, Verdict
+from replay.batch.judged import LOG, OVERLAY, Judged, Regression, Verdict
 from replay.comparison import report_html
 
-_FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, "log.txt", "result.json")
+_FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, LOG, "result.json")
 _ORDER = [verdict for verdict in Verdict if not verdict.fine] + [verdict for verdict in Verdict if verdict.fine]
+_LINES = 30
+"""Of a log that are shown on the page."""
 _OPEN = 3
 """As many failing scenarios are shown open; more of them would hide one another."""
 
@@ -31,12 +33,14 @@ class Row:
         since: when the row of failing nights began; "" when this is the first.
         links: text and address of its files.
         command: what reproduces it, for a shell.
+        log: the end of what it said, when that is all that there is.
     """
 
     item: Judged
     since: str
     links: tuple[tuple[str, str], ...]
     command: str
+    log: str
 
 
 def index(found: Regression, since: Mapping[str, str]) -> str:
@@ -47,7 +51,10 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
         since: when the row of failing nights began, by scenario.
     """
     ordered = sorted(found.judged, key=lambda item: (_ORDER.index(item.verdict), item.name))
-    rows = [Row(item, since.get(item.name, ""), _links(found, item), command(found, item)) for item in ordered]
+    rows = [
+        Row(item, since.get(item.name, ""), _links(found, item), command(found, item), _log(found, item))
+        for item in ordered
+    ]
     failing = [row for row in rows if not row.item.verdict.fine]
     page: str = _template().render(
         found=found,
@@ -57,18 +64,31 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
         open=len(failing) <= _OPEN,
         style=report_html.style(),
         details=report_html.details,
+        folder=Path.cwd(),
         version=replay.__version__,
         host=platform.node(),
     )
     return page
 
 
+def _row(found: Regression, item: Judged, since: str) -> Row:
+    return Row(item, since, _links(found, item), command(found, item), _log(found, item))
+
+
 def command(found: Regression, item: Judged) -> str:
     """Return the command that runs and compares one scenario again."""
-    parts = ["replay", "regress", item.source or "SCENARIOS", "--select", item.name]
+    parts = ["replay", "regress", item.source, "--select", item.name]
     parts += ["--baseline", str(found.baseline), "-o", "again"]
     parts += [*(["--rules", found.rules] if found.rules else []), *(["--model", found.model] if found.model else [])]
     return shlex.join(parts)
+
+
+def _log(found: Regression, item: Judged) -> str:
+    if item.result is None or item.result.status.recorded:
+        return ""
+    log = found.run.directory / item.name / LOG
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.is_file() else []
+    return "\n".join(lines[-_LINES:])
 
 
 def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:

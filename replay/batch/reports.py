@@ -11,6 +11,7 @@ from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
 from replay.batch.run import as_json
+from replay.comparison import wording
 from replay.errors import WriteError
 from replay.logs.part_file import write_file
 
@@ -66,10 +67,11 @@ def describe(found: Regression) -> list[str]:
     """Return the outcome as lines for people: what needs attention, then counts."""
     failing = [item for item in found.judged if not item.verdict.fine]
     lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
-    lines += [f"unused baseline: {name}" for name in found.unused]
+    if found.unused:
+        number = wording.count(len(found.unused), "unused baseline")
+        lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}")
     lines += ["interrupted: the reports are partial"] if found.run.interrupted else []
     counts = {verdict: found.count(verdict) for verdict in dict.fromkeys(item.verdict for item in found.judged)}
-    lines.append(
-        f"{len(found.judged)} scenarios: " + ", ".join(f"{n} {verdict.value}" for verdict, n in counts.items())
-    )
+    parts = [f"{number} {verdict.value}" for verdict, number in counts.items()]
+    lines.append(f"{wording.count(len(found.judged), 'scenario')}: {', '.join(parts)}")
     return lines

@@ -16,6 +16,8 @@ from replay.scenario.model import Scenario
 RULES = "rules.yaml"
 """Name of the file of tolerances that comes with a folder of scenarios."""
 
+RECORDINGS = (".mcap", ".mcap.part")
+"""What names of recordings end in, finished and unfinished ones."""
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
 
 
@@ -27,10 +29,12 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     environment's, are not looked at.
 
     Raises:
-        InvalidValue: a path is not there, or a folder holds no scenario.
+        InvalidValue: a path is not there or is an `.rrd`, or a folder holds no scenario.
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):
+        if path.is_file() and path.suffix == ".rrd":
+            raise InvalidValue("SCENARIO", path, "holds drawings only; the .mcap beside it can be run again")
         if path.is_file():
             found[path] = None
         elif path.is_dir():
@@ -60,12 +64,16 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
         RecordingError: a recording cannot be read.
         InvalidValue: see `find_scenarios`.
     """
-    scenarios: list[Scenario] = []
+    return [scenario for scenario, _ in _load(paths)]
+
+
+def _load(paths: Sequence[str | Path]) -> list[tuple[Scenario, Path]]:
+    scenarios: list[tuple[Scenario, Path]] = []
     problems: list[Problem] = []
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
         try:
-            found = [_attached(path)] if path.suffix == ".mcap" else load_cases(path)
+            found = [_attached(path)] if path.name.endswith(RECORDINGS) else load_cases(path)
         except ScenarioError as error:
             problems.extend(error.problems)
             continue
@@ -74,7 +82,7 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
                 rule = f"name {scenario.name!r} is taken by {homes[scenario.name]}; each scenario of a run has its own"
                 problems.append(Problem(rule, file=str(path)))
             homes[scenario.name] = path
-            scenarios.append(scenario)
+            scenarios.append((scenario, path))
     if problems:
         raise ScenarioError(problems)
     return scenarios
@@ -94,21 +102,24 @@ class Selection:
     Attributes:
         chosen: the scenarios to run.
         skipped: those that were filtered out, by name, with the reason.
+        sources: the file that each comes from, as the user named it.
     """
 
     chosen: tuple[Scenario, ...]
     skipped: Mapping[str, str]
+    sources: Mapping[str, Path]
 
     @staticmethod
     def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
         """Return what paths, patterns and a shard select; errors as of `load_all`."""
-        everything = load_all(paths)
+        loaded = _load(paths)
+        everything = [scenario for scenario, _ in loaded]
         matching = select(everything, patterns)
         chosen = shard.of(matching) if shard else matching
         names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
         skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
         skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
-        return Selection(tuple(chosen), skipped)
+        return Selection(tuple(chosen), skipped, {scenario.name: path for scenario, path in loaded})
 
 
 def _matches(scenario: Scenario, pattern: str) -> bool:

@@ -13,14 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.gjk import distance, intersect
-from replay.collision.gjk_exact import CONTACT, DISTANCE, SEPARATED, Workspace
-from replay.collision.gjk_kernel import query
-from replay.collision.support import Sets, make_sets
-from replay.geometry.convex import from_pieces
+from replay.collision.gjk import Convex, Status, distance, distances, intersect, intersects
 from replay.geometry.hull import convex_hull
 from replay.numerics import transforms
-from replay.numerics.jit import kernel
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -69,64 +64,31 @@ class Engine:
         return ""
 
 
-def sets_of(vertices: Floats) -> Sets:
-    """Return one convex set as the kernels read it."""
-    body = from_pieces([vertices])
-    return make_sets(body.vertices, body.first, body.neighbors_first, body.neighbors)
-
-
-@kernel
-def answer_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, answers: Floats) -> None:
-    """Write the distance for each of T_a_b (n, 4, 4), -1 for contact; above `cutoff` any bound proves it.
-
-    Every query starts afresh, so that it costs what an unrelated query costs. `reach` is max|a| + max|b|.
-    """
-    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
-    rotation, translation = np.empty((3, 3)), np.empty(3)
-    for k in range(len(T_a_b)):
-        square = 0.0
-        for i in range(3):
-            translation[i] = T_a_b[k, i, 3]
-            square += translation[i] * translation[i]
-            for j in range(3):
-                rotation[i, j] = T_a_b[k, i, j]
-        work.simplex[4, 0] = 0
-        status = query(a, 0, b, 0, rotation, translation, reach + np.sqrt(square), cutoff, 0.0, work)
-        if status == SEPARATED:
-            answers[k] = work.result[DISTANCE]
-        else:
-            answers[k] = -1.0 if status == CONTACT else np.nan
-
-
 def _ours(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
-    sets_a, sets_b = sets_of(a.vertices), sets_of(b.vertices)
-    reach = float(sum(np.sqrt(np.max(np.sum(body.vertices**2, axis=1))) for body in (a, b)))
+    """All poses in one call, as the pipeline works; every query starts afresh, as an unrelated one does."""
+    first, second = Convex(a.vertices), Convex(b.vertices)
     T_a_b = np.ascontiguousarray(transforms.compose(transforms.invert(T_world_a), T_world_b))
-    answers = np.empty(len(T_a_b))
+    contact = Status.CONTACT.value
 
     def hits() -> Flags:
-        answer_all(sets_a, sets_b, T_a_b, reach, 0.0, answers)
-        return ~(answers >= 0.0)
+        return intersects(first, second, T_a_b) >= contact
 
-    def distances() -> Floats:
-        answer_all(sets_a, sets_b, T_a_b, reach, np.inf, answers)
-        return np.maximum(answers, 0.0)
-
-    return Queries(hits, distances)
+    return Queries(hits, lambda: distances(first, second, T_a_b)[1])
 
 
 def _ours_checked(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
+    first, second = Convex(a.vertices), Convex(b.vertices)
     pairs = list(zip(T_world_a, T_world_b, strict=True))
 
     def hits() -> Flags:
-        verdicts = (intersect(a.vertices, b.vertices, pose_a=x, pose_b=y) for x, y in pairs)
+        verdicts = (intersect(first, second, pose_a=x, pose_b=y) for x, y in pairs)
         return np.array([verdict.direction is None for verdict in verdicts])
 
-    def distances() -> Floats:
-        answers = (distance(a.vertices, b.vertices, pose_a=x, pose_b=y) for x, y in pairs)
+    def measured() -> Floats:
+        answers = (distance(first, second, pose_a=x, pose_b=y) for x, y in pairs)
         return np.array([answer.distance for answer in answers])
 
-    return Queries(hits, distances)
+    return Queries(hits, measured)
 
 
 def _fcl(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:

@@ -33,5 +33,9 @@ def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
     if not yes and not click.confirm("Accept?", err=True):
         note("nothing was changed")
         return ExitCode.DIFFERENT
+    if not reason and not yes:
+        reason = click.prompt("Why are they right?", err=True)
+    if not reason:
+        note("no --reason: the baseline's log will not say why")
     plan.commit(reason=reason, now=datetime.datetime.now(datetime.UTC))
     return ExitCode.FINE

@@ -44,5 +44,5 @@ def export(recording: Path, form: Format, output: Path | None, topics: tuple[str
         click.echo(str(file))
     if found.loss is None:
         return ExitCode.FINE
-    note(f"{recording}: salvaged: {found.loss.reason}; {found.lost_frames} frames are lost")
+    note(f"{recording}: {found.loss_text}")
     return ExitCode.LOSSES

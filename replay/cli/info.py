@@ -24,7 +24,5 @@ def info(recording: Path, form: str) -> ExitCode:
     say(form, found.as_text, found.as_json)
     if found.loss is None:
         return ExitCode.FINE
-    note(
-        f"{recording}: salvaged: {found.loss.reason}; {found.loss.bytes} bytes and {found.lost_frames} frames are lost"
-    )
+    note(f"{recording}: {found.loss.text(found.frames, found.provenance.frames)}")
     return ExitCode.LOSSES

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import io
 import sys
 import traceback
 from collections.abc import Sequence
@@ -77,6 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     files and takes the viewer with it.
     """
     interruption.install()
+    for stream in (sys.stdout, sys.stderr):  # a name that the terminal cannot show is shown as escapes
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     code = ExitCode.INTERRUPTED
     try:
         code = run(arguments)

@@ -12,6 +12,7 @@ from replay.cli import options
 from replay.cli.exit_codes import ExitCode
 
 FILE = click.Path(path_type=Path)
+MISSING = click.Choice(["fail", "create", "skip"])
 
 
 @click.command()
@@ -19,7 +20,7 @@ FILE = click.Path(path_type=Path)
 @click.option("--baseline", type=FILE, required=True, help="Folder of accepted recordings; see `replay accept`.")
 @options.output_option("regress")
 @click.option("--rules", type=FILE, help="Tolerances; rules.yaml beside SCENARIOS when left out.")
-@click.option("--missing-baseline", "missing", type=click.Choice(["fail", "create", "skip"]), default="fail")
+@click.option("--missing-baseline", "missing", type=MISSING, default="fail", help="What a scenario without one is.")
 @click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
 @click.option("--history", type=FILE, help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @options.model_option

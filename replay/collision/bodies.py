@@ -68,7 +68,6 @@ def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
     probes = [_probes(sets) for sets in several]
     vertices = [sets.vertices for sets in several]
     vertex_first = _starts(vertices)
-    edge_first = _starts([sets.neighbors for sets in several])
     lower = np.concatenate([sets.tree.lower for sets in several])
     upper = np.concatenate([sets.tree.upper for sets in several])
     center = 0.5 * lower + 0.5 * upper
@@ -78,8 +77,6 @@ def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
         sets=make_sets(
             np.concatenate(vertices),
             _joined([sets.first for sets in several], vertex_first),
-            _joined([sets.neighbors_first for sets in several], edge_first),
-            np.concatenate([sets.neighbors for sets in several]),
         ),
         set_first=_starts([sets.first[1:] for sets in several]),
         tree=Tree(lower, upper, *(np.concatenate([sets.tree[k] for sets in several]) for k in range(2, 6))),

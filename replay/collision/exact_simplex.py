@@ -13,16 +13,30 @@ to e to its own last digit, which p + t e is only to the last digit of p. Faces 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import double_double as dd
+from replay.numerics import double_double as dd
 from replay.numerics.jit import leaf_kernel
 
 Floats = NDArray[np.float64]
 
 DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""
+
+
+SHARED = 2.0**-192
+"""Squared rounding error of a corner's share over its factors. With a newest corner, a share that is 0 to rounding
+counts: the foot moves by nothing, but its direction is then orthogonal to the whole feature, which tells the next
+support point from this one where a sheet of 1e-16 of the size is all there is to go through."""
+
+LEAST = 1e-60
+"""Weight of a corner whose share is rounding only, so that it is kept."""
+
+WITNESS = 2.0**-44
+"""Largest accepted distance, over size, of the two points that the weights of a contact stand for."""
 
 
 @leaf_kernel
@@ -36,7 +50,7 @@ def corner(points: Floats, i: int) -> dd.Vector:
 
 
 @leaf_kernel
-def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Number]:
+def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -> tuple[bool, dd.Vector, dd.Pair]:
     """Return (inside, nearest point, its squared distance to the origin) for the simplex points[:n].
 
     Args:
@@ -44,11 +58,13 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
         n: number of corners.
         newest: the corner that the nearest point's feature must have; -1 for any.
         size: bound on the corners' distance from the origin.
-        weights: (4,) barycentric coordinates of the nearest point, out.
+        weights: (4,) shares of the corners in the nearest point, out. Inside a tetrahedron so flat that its shares are
+            mostly rounding, they are those of its nearest corner, edge or face.
     """
     zero = (0.0, 0.0)
     best_point = (zero, zero, zero)
-    if n == 4 and _contains_origin(points, size, weights):
+    inside = n == 4 and _contains_origin(points, size, weights)
+    if inside and residual(points, n, weights) <= WITNESS * size:
         return True, best_point, zero
     best = (np.inf, 0.0)
     weights[:] = 0.0
@@ -68,7 +84,10 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             e = dd.difference(q, p)
             total = dd.dot(e, e)
             of_p, of_q = dd.dot(q, e), dd.negative(dd.dot(p, e))
-            if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(total)):
+            if not dd.is_positive(total):
+                continue
+            lengths = (total[0] * dd.dot(q, q)[0], total[0] * dd.dot(p, p)[0])
+            if not (_shares(of_p, lengths[0], newest) and _shares(of_q, lengths[1], newest)):
                 continue
             turned = dd.cross(e, dd.cross(p if of_p[0] >= of_q[0] else q, e))
             foot = (dd.divide(turned[0], total), dd.divide(turned[1], total), dd.divide(turned[2], total))
@@ -77,7 +96,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
                 best = square
                 best_point = foot
                 weights[:] = 0.0
-                weights[i], weights[j] = of_p[0] / total[0], of_q[0] / total[0]
+                weights[i], weights[j] = max(of_p[0] / total[0], LEAST), max(of_q[0] / total[0], LEAST)
     for skipped in range(4):
         i = 0 if skipped > 0 else 1
         j = 1 if skipped > 1 else 2
@@ -95,7 +114,10 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             dd.dot(normal, dd.cross(r, p)),
             dd.dot(normal, dd.cross(p, q)),
         )
-        if not (dd.is_positive(of_p) and dd.is_positive(of_q) and dd.is_positive(of_r)):
+        pp, qq, rr = total[0] * dd.dot(p, p)[0], dd.dot(q, q)[0], dd.dot(r, r)[0]
+        if not (_shares(of_p, total[0] * qq * rr, newest) and _shares(of_q, pp * rr, newest)):
+            continue
+        if not _shares(of_r, pp * qq, newest):
             continue
         foot = dd.scale(dd.divide(dd.dot(normal, p), total), normal)
         square = dd.dot(foot, foot)
@@ -103,8 +125,27 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             best = square
             best_point = foot
             weights[:] = 0.0
-            weights[i], weights[j], weights[k] = of_p[0] / total[0], of_q[0] / total[0], of_r[0] / total[0]
-    return False, best_point, best
+            weights[i], weights[j] = max(of_p[0] / total[0], LEAST), max(of_q[0] / total[0], LEAST)
+            weights[k] = max(of_r[0] / total[0], LEAST)
+    return inside, best_point, best
+
+
+@leaf_kernel
+def _shares(share: dd.Pair, square: float, newest: int) -> bool:
+    """Return whether a corner has a part in a feature's foot, `square` being that of the factors of its share."""
+    return dd.is_positive(share) or (newest >= 0 and share[0] * share[0] <= SHARED * square)
+
+
+@leaf_kernel
+def residual(points: Floats, n: int, weights: Floats) -> float:
+    """Return how far the weighted mean of the points is from the origin."""
+    x, y, z, total = 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        x += weights[k] * points[k, 0, 0]
+        y += weights[k] * points[k, 1, 0]
+        z += weights[k] * points[k, 2, 0]
+        total += weights[k]
+    return math.sqrt(x * x + y * y + z * z) / total
 
 
 @leaf_kernel
@@ -117,5 +158,5 @@ def _contains_origin(points: Floats, size: float, weights: Floats) -> bool:
     volume = a[0] + b[0] + c[0] + d[0]
     sign = -1.0 if volume < 0.0 else 1.0
     limit = 2.0**-96 * size * size * size
-    weights[0], weights[1], weights[2], weights[3] = a[0] / volume, b[0] / volume, c[0] / volume, d[0] / volume
+    weights[0], weights[1], weights[2], weights[3] = sign * a[0], sign * b[0], sign * c[0], sign * d[0]
     return min(sign * a[0], sign * b[0], sign * c[0], sign * d[0]) > limit

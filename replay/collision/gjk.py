@@ -5,23 +5,20 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from replay.collision import gjk_exact, gjk_kernel
+from replay.collision import gjk_exact, gjk_pair
+from replay.collision.gjk_exact import DIRECTION, DISTANCE, LOWER, POINT_A, POINT_B
+from replay.collision.gjk_pair import LARGEST_COORDINATE, MIDDLE, RIGID_TOLERANCE
 from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
 
 Floats = NDArray[np.float64]
-
-RIGID_TOLERANCE = 1e-6
-"""Largest accepted |R^T R - I|. The vertices are mapped by the matrix as given, so a pose that is rigid to this
-tolerance costs no accuracy; a larger error is a scaled, sheared or mistyped matrix."""
-
-LARGEST_COORDINATE = 1e100
-"""Coordinates beyond this [m] are refused: their squares would overflow."""
 
 
 class Status(enum.Enum):
@@ -30,6 +27,9 @@ class Status(enum.Enum):
     SEPARATED = gjk_exact.SEPARATED
     CONTACT = gjk_exact.CONTACT
     UNDECIDED = gjk_exact.UNDECIDED
+
+
+_STATUSES = tuple(Status)  # by their values, 0, 1, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,38 @@ class Separation:
     direction: Floats | None
 
 
+class Convex:
+    """The convex hull of vertices that are asked about often: checked and prepared once.
+
+    Args:
+        vertices: (n, 3) [m], n >= 1, in any order; duplicate, collinear, coplanar and inner points are allowed.
+
+    Raises:
+        InvalidValue: wrong shape, not finite, or beyond 1e100 m.
+    """
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        self.vertices = _vertices("vertices", vertices).copy()
+        self.vertices.flags.writeable = False
+        _check_finite("vertices", self.vertices)
+
+    @cached_property
+    def sets(self) -> Sets:
+        """The hull as kernels read it."""
+        return make_sets(self.vertices, np.array([0, len(self.vertices)], dtype=np.int64))
+
+    @cached_property
+    def reach(self) -> float:
+        """The largest distance of a vertex from the origin [m]."""
+        return math.sqrt(float(np.max(np.sum(self.vertices**2, axis=1))))
+
+
 def intersect(
-    a: ArrayLike, b: ArrayLike, *, pose_a: ArrayLike | None = None, pose_b: ArrayLike | None = None
+    a: ArrayLike | Convex,
+    b: ArrayLike | Convex,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
 ) -> Verdict:
     """Return whether the convex hulls of two vertex sets meet; touching is meeting.
 
@@ -92,17 +122,20 @@ def intersect(
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.
     """
-    problem = _Problem(a, b, pose_a, pose_b)
-    status = problem.solve(cutoff=0.0)
+    status, answer = _ask(a, b, pose_a, pose_b, 0.0)
     if status is Status.CONTACT:
-        return Verdict(status, None, 0.0, problem.world(0.5 * (problem.point_a + problem.point_b)))
+        return Verdict(status, None, 0.0, answer[MIDDLE : MIDDLE + 3])
     if status is Status.UNDECIDED:
         return Verdict(status, None, 0.0, None)
-    return Verdict(status, problem.direction, problem.lower_bound, None)
+    return Verdict(status, answer[DIRECTION : DIRECTION + 3], float(answer[LOWER]), None)
 
 
 def distance(
-    a: ArrayLike, b: ArrayLike, *, pose_a: ArrayLike | None = None, pose_b: ArrayLike | None = None
+    a: ArrayLike | Convex,
+    b: ArrayLike | Convex,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
 ) -> Separation:
     """Return the distance of the convex hulls of two vertex sets, with witness points; 0 where they meet or touch.
 
@@ -115,133 +148,82 @@ def distance(
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.
     """
-    problem = _Problem(a, b, pose_a, pose_b)
-    status = problem.solve(cutoff=math.inf)
-    point_a, point_b = problem.world(problem.point_a), problem.world(problem.point_b)
+    status, answer = _ask(a, b, pose_a, pose_b, math.inf)
     if status is Status.CONTACT:
-        middle = problem.world(0.5 * (problem.point_a + problem.point_b))
+        middle = answer[MIDDLE : MIDDLE + 3]
         return Separation(status, 0.0, 0.0, middle, middle.copy(), None)
-    direction = problem.direction if status is Status.SEPARATED else None
-    return Separation(status, problem.upper_bound, problem.lower_bound, point_a, point_b, direction)
+    direction = answer[DIRECTION : DIRECTION + 3] if status is Status.SEPARATED else None
+    point_a, point_b = answer[POINT_A : POINT_A + 3], answer[POINT_B : POINT_B + 3]
+    return Separation(status, float(answer[DISTANCE]), float(answer[LOWER]), point_a, point_b, direction)
 
 
-class _Problem:
-    """Two vertex sets about a common origin, scaled by a power of two to size 1, and what GJK says of them.
+def intersects(a: Convex, b: Convex, T_a_b: ArrayLike) -> NDArray[np.uint8]:
+    """Return the `Status` values (n,) of b at the poses T_a_b (n, 4, 4) in a's frame, an order faster than one by one.
 
-    With origin o halfway between the poses' origins, a is mapped to R_a a + h and b to R_b b - h, h = (p_a - p_b)/2:
-    the world position cancels before anything is rounded, and swapping the arguments swaps the numbers bit by bit.
-    An origin far from the vertices is subtracted only along axes on which that is exact (Sterbenz).
+    Raises:
+        InvalidValue: as `intersect`.
+
+    Accuracy: as `collision.pipeline`: the vertices of b are rounded in a's frame.
     """
-
-    def __init__(self, a: ArrayLike, b: ArrayLike, pose_a: ArrayLike | None, pose_b: ArrayLike | None) -> None:
-        rotation_a, position_a = _pose("pose_a", pose_a)
-        rotation_b, position_b = _pose("pose_b", pose_b)
-        half = 0.5 * (position_a - position_b)
-        self._origin = position_a - half
-        points_a = _mapped(rotation_a, _vertices("a", a), half)
-        points_b = _mapped(rotation_b, _vertices("b", b), -half)
-        shift = _exact_shift(points_a, points_b)
-        points_a, points_b = points_a - shift, points_b - shift
-        self._origin = self._origin + shift
-        largest = max(float(np.abs(points_a).max()), float(np.abs(points_b).max()))
-        self._scale = 2.0 ** math.frexp(largest)[1] if largest > 0.0 else 1.0
-        self._a = _sets(points_a / self._scale)
-        self._b = _sets(points_b / self._scale)
-        self._work = gjk_kernel.workspace()
-
-    def solve(self, *, cutoff: float) -> Status:
-        size = 2.0 * math.sqrt(3.0)  # every coordinate is below 1
-        identity, zero = np.identity(3), np.zeros(3)
-        code = gjk_kernel.query(self._a, 0, self._b, 0, identity, zero, size, cutoff, 0.0, self._work)
-        return Status(code)
-
-    def world(self, point: Floats) -> Floats:
-        return point * self._scale + self._origin
-
-    def _vector(self, begin: int) -> Floats:
-        return self._work.result[begin : begin + 3].copy()
-
-    @property
-    def upper_bound(self) -> float:
-        return float(self._work.result[gjk_exact.DISTANCE]) * self._scale
-
-    @property
-    def lower_bound(self) -> float:
-        return float(self._work.result[gjk_exact.LOWER]) * self._scale
-
-    @property
-    def direction(self) -> Floats:
-        vector = self._vector(gjk_exact.DIRECTION)
-        return vector / math.sqrt(float(np.sum(vector * vector)))
-
-    @property
-    def point_a(self) -> Floats:
-        return self._vector(gjk_exact.POINT_A)
-
-    @property
-    def point_b(self) -> Floats:
-        return self._vector(gjk_exact.POINT_B)
+    return _ask_all(a, b, T_a_b, 0.0)[0]
 
 
-def _sets(vertices: Floats) -> Sets:
-    n = len(vertices)
-    return make_sets(
-        vertices,
-        np.array([0, n], dtype=np.int64),
-        np.zeros(n + 1, dtype=np.int64),
-        np.zeros(0, dtype=np.int64),
-    )
+def distances(a: Convex, b: Convex, T_a_b: ArrayLike) -> tuple[NDArray[np.uint8], Floats]:
+    """Return `Status` values (n,) and distances (n,) [m], 0 unless separated; see `intersects`.
+
+    Accuracy: relative 1e-12, plus 3e-15 of the bodies' reach and offset (tests/collision/test_gjk.py).
+    """
+    return _ask_all(a, b, T_a_b, math.inf)
 
 
-def _mapped(rotation: Floats | None, points: Floats, offset: Floats) -> Floats:
-    """Return R p + offset without BLAS, whose last digit depends on the machine."""
-    if rotation is None:
-        return points + offset
-    columns = [points[:, 0] * row[0] + points[:, 1] * row[1] + points[:, 2] * row[2] for row in rotation]
-    return np.stack(columns, axis=1) + offset
+def _ask_all(a: Convex, b: Convex, T_a_b: ArrayLike, cutoff: float) -> tuple[NDArray[np.uint8], Floats]:
+    poses = as_floats("T_a_b", T_a_b, (None, 4, 4))
+    faulty = gjk_pair.first_not_rigid(poses)
+    if faulty >= 0:
+        _refuse_pose(f"T_a_b[{faulty}]", poses[faulty])
+    status, found = np.empty(len(poses), dtype=np.uint8), np.empty(len(poses))
+    gjk_pair.ask_all(a.sets, b.sets, poses, a.reach + b.reach, cutoff, status, found)
+    return status, found
 
 
-def _exact_shift(a: Floats, b: Floats) -> Floats:
-    """Return the origin to subtract: per axis a value for which no subtraction rounds, else 0."""
-    low = np.minimum(a.min(axis=0), b.min(axis=0))
-    high = np.maximum(a.max(axis=0), b.max(axis=0))
-    near, far = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
-    exact = (np.sign(low) == np.sign(high)) & (far <= 2.0 * near)  # x/2 <= y <= 2x: x - y is exact
-    return np.where(exact, low, 0.0)
+_HERE = np.identity(4)
+
+
+def _ask(
+    a: ArrayLike | Convex, b: ArrayLike | Convex, pose_a: ArrayLike | None, pose_b: ArrayLike | None, cutoff: float
+) -> tuple[Status, Floats]:
+    """Return the status and `gjk_pair.ask`'s answer."""
+    points_a = a.vertices if isinstance(a, Convex) else _vertices("a", a)
+    points_b = b.vertices if isinstance(b, Convex) else _vertices("b", b)
+    here = _HERE if pose_a is None else as_floats("pose_a", pose_a, (4, 4))
+    there = _HERE if pose_b is None else as_floats("pose_b", pose_b, (4, 4))
+    answer = np.empty(16)
+    code = gjk_pair.ask(points_a, points_b, here, there, cutoff, answer)
+    if code >= 0:
+        return _STATUSES[code], answer
+    if code == gjk_pair.FAULT_A:
+        _check_finite("a", points_a)
+    elif code == gjk_pair.FAULT_B:
+        _check_finite("b", points_b)
+    elif code == gjk_pair.FAULT_POSE_A:
+        _refuse_pose("pose_a", here)
+    _refuse_pose("pose_b", there)
 
 
 def _vertices(name: str, value: ArrayLike) -> Floats:
     points = as_floats(name, value, (None, 3))
     if len(points) == 0:
         raise InvalidValue(name, "no points", "must have shape (n, 3) with n >= 1")
-    _check_finite(name, points)
     return points
 
 
-def _pose(name: str, value: ArrayLike | None) -> tuple[Floats | None, Floats]:
-    """Return (R or None for the identity, p) of a rigid transform."""
-    if value is None:
-        return None, np.zeros(3)
-    pose = as_floats(name, value, (4, 4))
+def _refuse_pose(name: str, pose: Floats) -> NoReturn:
+    """Raise what is wrong with a pose that is not rigid."""
     _check_finite(name, pose)
-    rotation, position = pose[:3, :3], pose[:3, 3]
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise InvalidValue(f"{name}[3]", pose[3].tolist(), "the last row of a rigid transform is 0 0 0 1")
-    if not _is_rotation(rotation):
-        rule = f"must be a rotation: |R^T R - I| <= {RIGID_TOLERANCE:g} and det R = +1"
-        raise InvalidValue(f"{name}[:3, :3]", rotation.tolist(), rule)
-    if (rotation == np.identity(3)).all():
-        return None, position
-    return rotation, position
-
-
-def _is_rotation(rotation: Floats) -> bool:
-    if float(np.abs(rotation).max()) > 2.0:
-        return False
-    x, y, z = rotation.T
-    gram = np.array([[float(np.sum(u * v)) for u in (x, y, z)] for v in (x, y, z)])
-    handed = float(np.sum(np.cross(x, y) * z))
-    return bool(float(np.abs(gram - np.identity(3)).max()) <= RIGID_TOLERANCE and handed > 0.0)
+    rule = f"must be a rotation: |R^T R - I| <= {RIGID_TOLERANCE:g} and det R = +1"
+    raise InvalidValue(f"{name}[:3, :3]", pose[:3, :3].tolist(), rule)
 
 
 def _check_finite(name: str, value: Floats) -> None:

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import double_double as dd
 from replay.collision import exact_simplex
-from replay.collision.support import Sets
-from replay.numerics.double_double import two_sum
-from replay.numerics.jit import leaf_kernel
+from replay.collision.support import Sets, candidates
+from replay.numerics import double_double as dd
+from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,6 +31,10 @@ ITERATIONS = 128
 TOUCHING = 2.0**-90
 """Sets nearer than this times their size touch."""
 
+INDISTINCT = 2.0**-53
+"""Where neither a separating plane nor a nearer pair of points is found, points nearer than this times size are a
+contact: coordinates are rounded by as much. Sheets of 1e-16 of their size through each other end here, 1 in 2 000."""
+
 ROUNDING = 2.0**-94
 """Bound of the error of a lower bound on the gap, over size, in double-doubles."""
 
@@ -41,13 +44,13 @@ CLOSED = 2.0**-48
 SAFE = 1.0 - 2.0**-50
 """Keeps a lower bound below what its last division and root may have added."""
 
-NO_PROGRESS = 1.0 + 2.0**-80
-"""A squared distance that grows by more than this factor ends the search. Equal ones go on: they still turn v."""
+LISTED = 2.0**-44
+"""A set's table is used if it leaves out only what is lower by this part of the size: rounding reaches 2^-50."""
 
 # What a query leaves in `Workspace.result`.
-DISTANCE = 0  # distance of the two witness points: an upper bound [m]
+DISTANCE = 0  # distance of the two witness points: an upper bound [m]; a lower one where that was above the cutoff
 LOWER = 1  # verified lower bound on the distance [m]
-DIRECTION = 2  # unit vector from A to B that separates by LOWER, 3 numbers
+DIRECTION = 2  # vector from A to B, of any length, that separates by LOWER, 3 numbers
 POINT_A = 5  # witness points, in A's frame, 3 numbers each
 POINT_B = 8
 STEPS = 11  # iterations in doubles and double-doubles
@@ -64,10 +67,16 @@ class Workspace(NamedTuple):
     precise: Floats  # (4, 3, 2)
 
 
-@leaf_kernel
+@kernel
+def workspace() -> Workspace:
+    """Return fresh scratch for queries."""
+    return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
+
+
+@inlined_kernel
 def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[float, float, float]:
     """Return B's vertex i in A's frame, rounded."""
-    x, y, z = b.vertices[i, 0], b.vertices[i, 1], b.vertices[i, 2]
+    x, y, z = b.flat[3 * i], b.flat[3 * i + 1], b.flat[3 * i + 2]
     return (
         rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
         rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
@@ -75,7 +84,17 @@ def mapped(b: Sets, i: int, rotation: Floats, translation: Floats) -> tuple[floa
     )
 
 
-@leaf_kernel
+@inlined_kernel
+def turned_back(rotation: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a direction of A's frame along B's axes."""
+    return (
+        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
+        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
+        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
+    )
+
+
+@inlined_kernel
 def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) -> int:
     """Drop the points (4, 3) of weight 0 from a simplex of n, in place; return how many remain."""
     kept = 0
@@ -90,15 +109,18 @@ def keep_supporting(simplex: Integers, points: Floats, weights: Floats, n: int) 
     return kept
 
 
-@leaf_kernel
+@inlined_kernel
 def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work: Workspace) -> None:
     """Write the points of A and B that the simplex and its weights stand for, in A's frame."""
     result = work.result
     for axis in range(3):
         result[POINT_A + axis] = 0.0
         result[POINT_B + axis] = 0.0
+    total = 0.0
     for k in range(work.simplex[4, 0]):
-        weight = work.weights[k]
+        total += work.weights[k]
+    for k in range(work.simplex[4, 0]):
+        weight = work.weights[k] / total
         i = work.simplex[k, 0]
         x, y, z = mapped(b, work.simplex[k, 1], rotation, translation)
         result[POINT_A] += weight * a.vertices[i, 0]
@@ -109,38 +131,47 @@ def write_witness(a: Sets, b: Sets, rotation: Floats, translation: Floats, work:
         result[POINT_B + 2] += weight * z
 
 
-@leaf_kernel
+@inlined_kernel
 def _point(points: Floats, k: int, a: Sets, i: int, b: Sets, j: int, rotation: Floats, translation: Floats) -> None:
     x, y, z = mapped(b, j, rotation, translation)
-    points[k, 0, 0], points[k, 0, 1] = two_sum(a.vertices[i, 0], -x)
-    points[k, 1, 0], points[k, 1, 1] = two_sum(a.vertices[i, 1], -y)
-    points[k, 2, 0], points[k, 2, 1] = two_sum(a.vertices[i, 2], -z)
+    points[k, 0, 0], points[k, 0, 1] = dd.two_sum(a.vertices[i, 0], -x)
+    points[k, 1, 0], points[k, 1, 1] = dd.two_sum(a.vertices[i, 1], -y)
+    points[k, 2, 0], points[k, 2, 1] = dd.two_sum(a.vertices[i, 2], -z)
 
 
 @leaf_kernel
 def _farthest(
-    sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, margin: float
+    sets: Sets, k: int, rotation: Floats, translation: Floats, direction: dd.Vector, is_b: bool, size: float
 ) -> int:
     """Return the vertex row of set k farthest along a direction (A's frame), compared in double-doubles."""
-    best = int(sets.first[k])
-    top = -np.inf
     x, y, z = direction[0][0], direction[1][0], direction[2][0]
-    for i in range(sets.first[k], sets.first[k + 1]):
-        px, py, pz = sets.vertices[i, 0], sets.vertices[i, 1], sets.vertices[i, 2]
-        if is_b:
-            px, py, pz = mapped(sets, i, rotation, translation)
-        top = max(top, px * x + py * y + pz * z)
-    highest = (-np.inf, 0.0)
-    for i in range(sets.first[k], sets.first[k + 1]):
-        px, py, pz = sets.vertices[i, 0], sets.vertices[i, 1], sets.vertices[i, 2]
-        if is_b:
-            px, py, pz = mapped(sets, i, rotation, translation)
-        if px * x + py * y + pz * z >= top - margin:
-            height = dd.dot(((px, 0.0), (py, 0.0), (pz, 0.0)), direction)
+    begin, end = sets.first[k], sets.first[k + 1]
+    listed = sets.side[k] > 0 and sets.margin[k] > LISTED * size
+    if listed:
+        u, v, w = turned_back(rotation, x, y, z) if is_b else (x, y, z)
+        begin, end = candidates(sets, sets.table[k], sets.side[k], u, v, w)
+    top = -np.inf
+    for e in range(begin, end):
+        p = _placed(sets, sets.candidates[e] if listed else e, rotation, translation, is_b)
+        top = max(top, p[0] * x + p[1] * y + p[2] * z)
+    top -= 2.0**-48 * size * (abs(x) + abs(y) + abs(z))
+    best, highest = 0, (-np.inf, 0.0)
+    for e in range(begin, end):
+        i = sets.candidates[e] if listed else e
+        p = _placed(sets, i, rotation, translation, is_b)
+        if p[0] * x + p[1] * y + p[2] * z >= top:
+            height = dd.dot(((p[0], 0.0), (p[1], 0.0), (p[2], 0.0)), direction)
             if dd.is_less(highest, height):
-                highest = height
-                best = i
+                highest, best = height, i
     return best
+
+
+@inlined_kernel
+def _placed(sets: Sets, i: int, rotation: Floats, translation: Floats, is_b: bool) -> tuple[float, float, float]:
+    """Return vertex i in A's frame."""
+    if is_b:
+        return mapped(sets, i, rotation, translation)
+    return sets.flat[3 * i], sets.flat[3 * i + 1], sets.flat[3 * i + 2]
 
 
 @leaf_kernel
@@ -179,9 +210,8 @@ def refine(
         for k in range(n):
             _point(points, k, a, simplex[k, 0], b, simplex[k, 1], rotation, translation)
         backward = (dd.negative(v[0]), dd.negative(v[1]), dd.negative(v[2]))
-        margin = 2.0**-48 * size * length
-        i = _farthest(a, set_a, rotation, translation, backward, False, margin)
-        j = _farthest(b, set_b, rotation, translation, v, True, margin)
+        i = _farthest(a, set_a, rotation, translation, backward, False, size)
+        j = _farthest(b, set_b, rotation, translation, v, True, size)
         _point(points, n, a, i, b, j, rotation, translation)
         lower = SAFE * (dd.dot(v, exact_simplex.corner(points, n))[0] / length) - ROUNDING * size
         if lower > result[LOWER]:
@@ -195,7 +225,8 @@ def refine(
             break
         simplex[n, 0], simplex[n, 1] = i, j
         inside, nearer, square_nearer = exact_simplex.nearest(points, n + 1, n, size, weights)
-        if not inside and not square_nearer[0] <= NO_PROGRESS * square[0]:
+        # equal lengths go on, since they still turn v; one that grows by more than its rounding ends the search
+        if not inside and not math.sqrt(square_nearer[0]) <= length + ROUNDING * size:
             break
         v, square = nearer, square_nearer
         n += 1
@@ -205,4 +236,7 @@ def refine(
     write_witness(a, b, rotation, translation, work)
     if result[LOWER] > 0.0:
         return SEPARATED
+    if result[DISTANCE] <= INDISTINCT * size:
+        result[DISTANCE] = 0.0
+        return CONTACT
     return UNDECIDED

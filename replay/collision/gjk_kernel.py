@@ -1,10 +1,10 @@
 """GJK on two convex vertex sets: do they meet, and how far apart are they; in doubles, with proofs.
 
 A and B meet iff the Minkowski difference A - B holds the origin; their distance is its distance to the origin. The loop
-keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance), and
-asks for the point w of A - B that is lowest along v. Nothing in A - B is lower, so v.w/|v| is a lower bound on the
-distance along -v/|v|, and w is the simplex's next point. Without a simplex to start from, v is the mean of B's vertices
-subtracted from that of A's.
+keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance) as a
+direction d of any length, and asks for the point w of A - B that is lowest along d. Nothing in A - B is lower, so
+d.w/|d| is a lower bound on the distance along -d, and w is the simplex's next point. Without a simplex to start from,
+d is the mean of B's vertices subtracted from that of A's. Divisions and roots wait until a bound is worth having.
 
 Nothing is answered without a proof:
 - SEPARATED: a lower bound minus its rounding error is above `cutoff` (0 asks for the boolean, inf for the distance),
@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision import simplex as faces
+from replay.collision.exact_simplex import WITNESS
 from replay.collision.gjk_exact import (
     CONTACT,
     DIRECTION,
@@ -41,10 +42,11 @@ from replay.collision.gjk_exact import (
     keep_supporting,
     mapped,
     refine,
+    turned_back,
     write_witness,
 )
-from replay.collision.support import Sets, farthest_by_climbing, farthest_of_all
-from replay.numerics.jit import leaf_kernel
+from replay.collision.support import Sets, farthest
+from replay.numerics.jit import inlined_kernel
 
 Floats = NDArray[np.float64]
 
@@ -57,17 +59,8 @@ ROUNDING = 32.0 * 2.0**-53
 CLOSED = 1e-12
 """Relative duality gap at which a distance is accepted."""
 
-CLIMB_CHECKED = 1e-6
-"""Gaps below this times size are confirmed by looking at every vertex when vertices are climbed: hull adjacency is
-convex only to about 1e-13 of the size."""
 
-
-def workspace() -> Workspace:
-    """Return fresh scratch for queries."""
-    return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
-
-
-@leaf_kernel
+@inlined_kernel
 def query(
     a: Sets,
     set_a: int,
@@ -100,53 +93,45 @@ def query(
         points[k, 0], points[k, 1], points[k, 2] = a.vertices[i, 0] - x, a.vertices[i, 1] - y, a.vertices[i, 2] - z
     result[DISTANCE], result[LOWER], result[STEPS], result[EXACT] = np.inf, 0.0, 0.0, 0.0
     result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = 0.0, 0.0, 0.0
-    begin_a, end_a, climbs_a = a.first[set_a], a.first[set_a + 1], a.table[set_a] >= 0
-    begin_b, end_b, climbs_b = b.first[set_b], b.first[set_b + 1], b.table[set_b] >= 0
-    least = CLIMB_CHECKED * size if climbs_a or climbs_b else 0.0
+    begin_a, end_a, table_a, side_a = a.first[set_a], a.first[set_a + 1], a.table[set_a], a.side[set_a]
+    begin_b, end_b, table_b, side_b = b.first[set_b], b.first[set_b + 1], b.table[set_b], b.side[set_b]
     bound = ROUNDING * size
     shortest = np.inf
     for _ in range(ITERATIONS):
         if n == 0:  # the way from mean to mean is a point of A - B too, though of no simplex
-            vx, vy, vz = _between_means(a, set_a, b, set_b, rotation, translation)
-            square = vx * vx + vy * vy + vz * vz
+            d = _between_means(a, set_a, b, set_b, rotation, translation)
+            square = faces.dot(d, d)
             if not square > bound * bound:
-                vx, vy, vz, square = size, 0.0, 0.0, size * size
+                d, square = (size, 0.0, 0.0), size * size
         else:
-            place, vx, vy, vz = _nearest(points, n, size, weights)
+            place, d, square, wa, wb, wc, wd = _nearest(points, n, size)
+            weights[0], weights[1], weights[2], weights[3] = wa, wb, wc, wd
             if place == faces.INSIDE:
+                if not _witness_distance(points, n, weights) <= WITNESS * size:
+                    break  # a flat tetrahedron: its shares are mostly rounding
                 result[DISTANCE] = 0.0
                 write_witness(a, b, rotation, translation, work)
                 return CONTACT
-            square = vx * vx + vy * vy + vz * vz
             if place == faces.UNSURE or not (bound * bound < square < shortest):
                 break
             shortest = square
             n = keep_supporting(simplex, points, weights, n)
-        length = math.sqrt(square)
         result[STEPS] += 1.0
-        last = max(n - 1, 0)
-        if climbs_a:
-            i = farthest_by_climbing(a, set_a, -vx, -vy, -vz, simplex[last, 0])
-        else:
-            i = farthest_of_all(a.vertices, begin_a, end_a, -vx, -vy, -vz)
-        # v along B's axes
-        x = rotation[0, 0] * vx + rotation[1, 0] * vy + rotation[2, 0] * vz
-        y = rotation[0, 1] * vx + rotation[1, 1] * vy + rotation[2, 1] * vz
-        z = rotation[0, 2] * vx + rotation[1, 2] * vy + rotation[2, 2] * vz
-        if climbs_b:
-            j = farthest_by_climbing(b, set_b, x, y, z, simplex[last, 1])
-        else:
-            j = farthest_of_all(b.vertices, begin_b, end_b, x, y, z)
+        i = farthest(a, begin_a, end_a, table_a, side_a, -d[0], -d[1], -d[2])
+        x, y, z = turned_back(rotation, d[0], d[1], d[2])
+        j = farthest(b, begin_b, end_b, table_b, side_b, x, y, z)
         x, y, z = mapped(b, j, rotation, translation)
-        wx, wy, wz = a.vertices[i, 0] - x, a.vertices[i, 1] - y, a.vertices[i, 2] - z
-        lower = (vx * wx + vy * wy + vz * wz) / length - bound
-        if lower > result[LOWER]:
-            result[LOWER] = lower
-            result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -vx / length, -vy / length, -vz / length
-        if result[LOWER] > least:
-            if result[LOWER] > cutoff:
-                result[DISTANCE] = length
-                return SEPARATED
+        w = (a.flat[3 * i] - x, a.flat[3 * i + 1] - y, a.flat[3 * i + 2] - z)
+        along = faces.dot(d, w)
+        if along > 0.0:
+            lower = along / math.sqrt(faces.dot(d, d)) - bound
+            if lower > result[LOWER]:
+                result[LOWER] = lower
+                result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -d[0], -d[1], -d[2]
+                if lower > cutoff:
+                    result[DISTANCE] = lower
+                    return SEPARATED
+            length = math.sqrt(square)
             if n > 0 and length - result[LOWER] <= CLOSED * length + slack:
                 witness = _witness_distance(points, n, weights)
                 if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
@@ -160,13 +145,13 @@ def query(
         if repeated:
             break
         simplex[n, 0], simplex[n, 1] = i, j
-        points[n, 0], points[n, 1], points[n, 2] = wx, wy, wz
+        points[n, 0], points[n, 1], points[n, 2] = w
         n += 1
         simplex[4, 0] = n
     return refine(a, set_a, b, set_b, rotation, translation, size, cutoff, work)
 
 
-@leaf_kernel
+@inlined_kernel
 def _between_means(
     a: Sets, set_a: int, b: Sets, set_b: int, rotation: Floats, translation: Floats
 ) -> tuple[float, float, float]:
@@ -179,32 +164,31 @@ def _between_means(
     )
 
 
-@leaf_kernel
+@inlined_kernel
 def _witness_distance(points: Floats, n: int, weights: Floats) -> float:
     """Return the distance from the origin of the point of the simplex that the weights stand for."""
-    x, y, z = 0.0, 0.0, 0.0
+    x, y, z, total = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         x += weights[k] * points[k, 0]
         y += weights[k] * points[k, 1]
         z += weights[k] * points[k, 2]
-    return math.sqrt(x * x + y * y + z * z)
+        total += weights[k]
+    return math.sqrt(x * x + y * y + z * z) / total
 
 
-@leaf_kernel
-def _nearest(points: Floats, n: int, size: float, weights: Floats) -> tuple[int, float, float, float]:
-    """Return (OUTSIDE | INSIDE | UNSURE, x, y, z): the simplex's point nearest to the origin, its weights written."""
-    place = faces.OUTSIDE
+@inlined_kernel
+def _nearest(points: Floats, n: int, size: float) -> faces.Near4:
+    """Return `simplex.nearest_on_tetrahedron` of the first n points, 1 to 4."""
     a = (points[0, 0], points[0, 1], points[0, 2])
-    b = (points[1, 0], points[1, 1], points[1, 2])
-    c = (points[2, 0], points[2, 1], points[2, 2])
     if n == 1:
-        point, weights[0] = a, 1.0
-    elif n == 2:
-        point, weights[0], weights[1] = faces.nearest_on_segment(a, b)
-    elif n == 3:
-        point, weights[0], weights[1], weights[2] = faces.nearest_on_triangle(a, b, c)
-    else:
-        d = (points[3, 0], points[3, 1], points[3, 2])
-        place, point, wa, wb, wc, wd = faces.nearest_on_tetrahedron(a, b, c, d, size)
-        weights[0], weights[1], weights[2], weights[3] = wa, wb, wc, wd
-    return place, point[0], point[1], point[2]
+        return faces.OUTSIDE, a, faces.dot(a, a), 1.0, 0.0, 0.0, 0.0
+    b = (points[1, 0], points[1, 1], points[1, 2])
+    if n == 2:
+        point, square, wa, wb = faces.nearest_on_segment(a, b)
+        return faces.OUTSIDE, point, square, wa, wb, 0.0, 0.0
+    c = (points[2, 0], points[2, 1], points[2, 2])
+    if n == 3:
+        point, square, wa, wb, wc = faces.nearest_on_triangle(a, b, c)
+        return faces.OUTSIDE, point, square, wa, wb, wc, 0.0
+    d = (points[3, 0], points[3, 1], points[3, 2])
+    return faces.nearest_on_tetrahedron(a, b, c, d, size)

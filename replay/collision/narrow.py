@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from replay.collision import traversal
 from replay.collision.bodies import Bodies
 from replay.collision.broad import REPEAT, RUN
-from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, Workspace
+from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, workspace
 from replay.collision.scan import closest_of_all
 from replay.collision.traversal import STACK, closest, contains_part
 from replay.numerics.jit import kernel
@@ -49,7 +49,7 @@ def decide(
         counts: (COUNTS,) added to.
         savings: whether box trees and the last frame's answer may shorten the search.
     """
-    work = Workspace(np.zeros((5, 2), np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
+    work = workspace()
     nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(pairs)):

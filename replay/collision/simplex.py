@@ -3,10 +3,13 @@
 This is the fast half of GJK's inner step. It may err on nearly degenerate simplices; it never says so itself, because
 `gjk_kernel` accepts nothing without a verified bound and hands every doubtful query to `exact_simplex`.
 
+The nearest point is returned as a direction of any length, its squared distance, and the corners' shares in it: weights
+times a common positive factor, 0 for corners without a part. So nothing is divided that is not compared.
+
 Triangle with corners a, b, c and normal n = (b - a) x (c - a): the foot of the perpendicular from the origin has the
 barycentric coordinates n.(b x c), n.(c x a), n.(a x b), over n.n. The Voronoi regions of its corners and edges follow
-C. Ericson, Real-Time Collision Detection, 5.1.5. In the face region the nearest point is n (n.a)/(n.n): its direction
-is as good as the normal's, however near the origin is, where a weighted sum of corners would cancel.
+C. Ericson, Real-Time Collision Detection, 5.1.5. In the face region the nearest point is n (n.a)/(n.n): its direction,
++-n, is as good as the normal, however near the origin is, where a weighted sum of corners would cancel.
 
 Segment with ends a, b and e = b - a: the foot of the perpendicular is e x (a x e)/(e.e), orthogonal to e to its own
 last digit, which a + t e is only to the last digit of a.
@@ -19,12 +22,12 @@ from __future__ import annotations
 
 import math
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 
 Point = tuple[float, float, float]
-Near2 = tuple[Point, float, float]
-Near3 = tuple[Point, float, float, float]
-Near4 = tuple[int, Point, float, float, float, float]
+Near2 = tuple[Point, float, float, float]
+Near3 = tuple[Point, float, float, float, float]
+Near4 = tuple[int, Point, float, float, float, float, float]
 
 OUTSIDE = 0
 INSIDE = 1
@@ -34,93 +37,94 @@ DETERMINANT_ERROR = 64.0 * 2.0**-53
 """Bound of the rounding error of D_ijk over size max|p|^2; each product, each sum and each p_i contributes."""
 
 
-@leaf_kernel
+@inlined_kernel
 def dot(u: Point, v: Point) -> float:
     """Return the inner product."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@leaf_kernel
+@inlined_kernel
 def cross(u: Point, v: Point) -> Point:
     """Return the vector product."""
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
-@leaf_kernel
+@inlined_kernel
 def difference(u: Point, v: Point) -> Point:
     """Return u - v."""
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
-@leaf_kernel
+@inlined_kernel
 def nearest_on_segment(a: Point, b: Point) -> Near2:
-    """Return the point of the segment ab nearest to the origin, and the weights of a and b."""
+    """Return direction and squared distance of the segment's point nearest to the origin, and the shares of a and b."""
     e = difference(b, a)
     along = -dot(a, e)
-    square = dot(e, e)
-    if along <= 0.0 or square == 0.0:
-        return a, 1.0, 0.0
-    if along >= square:
-        return b, 0.0, 1.0
-    t = along / square
-    v = cross(e, cross(a if t <= 0.5 else b, e))
-    return (v[0] / square, v[1] / square, v[2] / square), 1.0 - t, t
+    total = dot(e, e)
+    if along <= 0.0 or total == 0.0:
+        return a, dot(a, a), 1.0, 0.0
+    rest = total - along
+    if rest <= 0.0:
+        return b, dot(b, b), 0.0, 1.0
+    v = cross(e, cross(a if along <= rest else b, e))
+    return v, dot(v, v) / (total * total), rest, along
 
 
-@leaf_kernel
+@inlined_kernel
 def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
-    """Return the point of the triangle abc nearest to the origin, and the weights of a, b and c."""
+    """Return direction and squared distance of the triangle's point nearest to the origin, and the corners' shares."""
     u, v = difference(b, a), difference(c, a)
     # corner regions
     au, av = -dot(u, a), -dot(v, a)
     if au <= 0.0 and av <= 0.0:
-        return a, 1.0, 0.0, 0.0
+        return a, dot(a, a), 1.0, 0.0, 0.0
     bu, bv = -dot(u, b), -dot(v, b)
     if bu >= 0.0 and bv <= bu:
-        return b, 0.0, 1.0, 0.0
+        return b, dot(b, b), 0.0, 1.0, 0.0
     cu, cv = -dot(u, c), -dot(v, c)
     if cv >= 0.0 and cu <= cv:
-        return c, 0.0, 0.0, 1.0
+        return c, dot(c, c), 0.0, 0.0, 1.0
     # edge regions: the corner opposite has no positive share
     n = cross(u, v)
-    square = dot(n, n)
+    total = dot(n, n)
     share_c = dot(n, cross(a, b))
     share_b = dot(n, cross(c, a))
-    share_a = square - share_b - share_c
+    share_a = total - share_b - share_c
     if share_c <= 0.0 and au >= 0.0 and bu <= 0.0:
-        point, wa, wb = nearest_on_segment(a, b)
-        return point, wa, wb, 0.0
+        point, square, wa, wb = nearest_on_segment(a, b)
+        return point, square, wa, wb, 0.0
     if share_b <= 0.0 and av >= 0.0 and cv <= 0.0:
-        point, wa, wc = nearest_on_segment(a, c)
-        return point, wa, 0.0, wc
+        point, square, wa, wc = nearest_on_segment(a, c)
+        return point, square, wa, 0.0, wc
     if share_a <= 0.0 and bv >= bu and cu >= cv:
-        point, wb, wc = nearest_on_segment(b, c)
-        return point, 0.0, wb, wc
+        point, square, wb, wc = nearest_on_segment(b, c)
+        return point, square, 0.0, wb, wc
     if not (share_a > 0.0 and share_b > 0.0 and share_c > 0.0):
         return _nearest_on_border(a, b, c)
     # face region
-    distance = dot(n, a) / square
-    weight_b, weight_c = share_b / square, share_c / square
-    return (n[0] * distance, n[1] * distance, n[2] * distance), 1.0 - weight_b - weight_c, weight_b, weight_c
+    height = dot(n, a)
+    if height < 0.0:
+        n = (-n[0], -n[1], -n[2])
+    return n, height * height / total, share_a, share_b, share_c
 
 
 @leaf_kernel
 def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
     """Let the three edges of a triangle compete: for one that is degenerate or contradicts itself."""
-    point, wa, wb = nearest_on_segment(a, b)
+    point, square, wa, wb = nearest_on_segment(a, b)
     wc = 0.0
-    other, va, vc = nearest_on_segment(a, c)
-    if dot(other, other) < dot(point, point):
-        point, wa, wb, wc = other, va, 0.0, vc
-    other, vb, vc = nearest_on_segment(b, c)
-    if dot(other, other) < dot(point, point):
-        point, wa, wb, wc = other, 0.0, vb, vc
-    return point, wa, wb, wc
+    other, closer, va, vc = nearest_on_segment(a, c)
+    if closer < square:
+        point, square, wa, wb, wc = other, closer, va, 0.0, vc
+    other, closer, vb, vc = nearest_on_segment(b, c)
+    if closer < square:
+        point, square, wa, wb, wc = other, closer, 0.0, vb, vc
+    return point, square, wa, wb, wc
 
 
-@leaf_kernel
+@inlined_kernel
 def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
-    """Return (OUTSIDE | INSIDE | UNSURE, point, weights of a, b, c, d).
+    """Return (OUTSIDE | INSIDE | UNSURE, direction, squared distance, shares of a, b, c, d).
 
     UNSURE if rounding may put the origin on either side. The point is the tetrahedron's nearest to the origin if
     OUTSIDE; if INSIDE it is the origin. `size` bounds the coordinates that the corners are differences of.
@@ -135,37 +139,27 @@ def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) 
     origin = (0.0, 0.0, 0.0)
     if volume > 4.0 * limit:
         if least > limit:
-            return INSIDE, origin, sa / volume, sb / volume, sc / volume, sd / volume
+            return INSIDE, origin, 0.0, sa, sb, sc, sd
         if least >= -limit:
-            return UNSURE, origin, 0.0, 0.0, 0.0, 0.0
+            return UNSURE, origin, 0.0, 0.0, 0.0, 0.0, 0.0
     else:
         limit = math.inf
     # outside, or flat: the faces that the origin is beyond, or may be, compete
     best = math.inf
     nearest = origin
     wa, wb, wc, wd = 0.0, 0.0, 0.0, 0.0
-    for skipped in range(4):
-        if skipped == 0:
-            share, p, q, r = sd, a, b, c
-        elif skipped == 1:
-            share, p, q, r = sc, a, b, d
-        elif skipped == 2:
-            share, p, q, r = sb, a, c, d
-        else:
-            share, p, q, r = sa, b, c, d
-        if share > limit:
-            continue
-        point, wp, wq, wr = nearest_on_triangle(p, q, r)
-        square = dot(point, point)
+    if sd <= limit:
+        nearest, best, wa, wb, wc = nearest_on_triangle(a, b, c)
+    if sc <= limit:
+        point, square, wp, wq, wr = nearest_on_triangle(a, b, d)
         if square < best:
-            best = square
-            nearest = point
-            if skipped == 0:
-                wa, wb, wc, wd = wp, wq, wr, 0.0
-            elif skipped == 1:
-                wa, wb, wc, wd = wp, wq, 0.0, wr
-            elif skipped == 2:
-                wa, wb, wc, wd = wp, 0.0, wq, wr
-            else:
-                wa, wb, wc, wd = 0.0, wp, wq, wr
-    return OUTSIDE, nearest, wa, wb, wc, wd
+            nearest, best, wa, wb, wc, wd = point, square, wp, wq, 0.0, wr
+    if sb <= limit:
+        point, square, wp, wq, wr = nearest_on_triangle(a, c, d)
+        if square < best:
+            nearest, best, wa, wb, wc, wd = point, square, wp, 0.0, wq, wr
+    if sa <= limit:
+        point, square, wp, wq, wr = nearest_on_triangle(b, c, d)
+        if square < best:
+            nearest, best, wa, wb, wc, wd = point, square, 0.0, wp, wq, wr
+    return OUTSIDE, nearest, best, wa, wb, wc, wd

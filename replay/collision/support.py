@@ -1,8 +1,12 @@
 """Support points: the vertex of a convex set that is farthest in a direction.
 
-Few vertices are all looked at. Many are climbed over the hull's edges, from the better of two starts: the caller's
-hint, and a table that holds the farthest vertex for the middle of each of `CELLS` cells of a cube about the origin, of
-which the direction names one. On 642 vertices that leaves about one step to climb.
+Few vertices are all looked at. For many, directions are sorted into cells once, and each cell lists the vertices that
+can be farthest for any direction in it: on 642 vertices about five. That is what climbing over a hull's edges ends at,
+without the steps, without a hull, and without a place to get stuck.
+
+Cells: the eight octants, and in each the squares of N x N over (u, v) = (|x|, |y|) / (|x| + |y| + |z|), those on the
+border u + v = 1 cut by it. A cell lies in a plane, so heights are linear over it: what is lower than one vertex at all
+its corners is lower in the whole cell. Cells are halved N = 1, 2, 4, ..; each looks only at what its parent kept.
 """
 
 from __future__ import annotations
@@ -12,127 +16,166 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+FEW = 16
+"""Sets of so many vertices or fewer are looked at vertex by vertex: as fast as finding the cell."""
 
-_STEPS = 8
-
-CELLS = 6 * _STEPS * _STEPS
-"""Cells of the table of starts: as many squares on each face of a cube as 642 vertices share out among."""
+MARGIN = 2.0**-30
+"""What a cell leaves out is lower than its highest vertex by this part of the set's largest coordinate, or more."""
 
 
 class Sets(NamedTuple):
-    """The arrays of `geometry.ConvexSets` that GJK reads, and what it starts from; see `make_sets`."""
+    """Convex sets as GJK reads them; see `make_sets`. Set k is the hull of vertices[first[k]:first[k + 1]].
+
+    Cell c of a set with a table lists candidates[cells[table[k] + c]:cells[table[k] + c + 1]], rows of `vertices`.
+    """
 
     vertices: Floats  # (v, 3) [m]
+    flat: Floats  # (3 v,) [m], the same memory: indexing it needs no stride
     first: Integers  # (m + 1,)
-    neighbors_first: Integers  # (v + 1,)
-    neighbors: Integers  # (e,)
     center: Floats  # (m, 3) [m], mean of each set's vertices
-    table: Integers  # (m,) row of `starts`, -1 for sets without adjacency
-    starts: Integers  # (t, CELLS) vertices within their set
+    side: Integers  # (m,) squares along a side of an octant, 0 for sets without a table
+    table: Integers  # (m,) row of `cells`
+    margin: Floats  # (m,) [m] what a cell leaves out is lower by, per |x| + |y| + |z| of the direction
+    cells: Integers  # (c,) rows of `candidates`
+    candidates: Integers  # (t,)
 
 
-def make_sets(vertices: Floats, first: Integers, neighbors_first: Integers, neighbors: Integers) -> Sets:
-    """Return convex sets, given as in `geometry.ConvexSets`, as GJK reads them."""
-    center = np.add.reduceat(vertices, first[:-1]) / np.diff(first)[:, None]
-    climbed = neighbors_first[first[:-1]] < neighbors_first[first[1:]]
-    table = np.where(climbed, np.cumsum(climbed) - 1, -1)
-    starts = np.zeros((int(climbed.sum()), CELLS), dtype=np.int64)
-    x, y, z = _cell_directions().T
-    for row, k in enumerate(np.flatnonzero(climbed)):
-        points = vertices[first[k] : first[k + 1]]
-        heights = points[:, :1] * x + points[:, 1:2] * y + points[:, 2:] * z
-        starts[row] = heights.argmax(axis=0)
-    return Sets(np.ascontiguousarray(vertices), first, neighbors_first, neighbors, center, table, starts)
+def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets:
+    """Return the convex hulls of vertices[first[k]:first[k + 1]] as GJK reads them.
 
-
-def _cell_directions() -> Floats:
-    """Return the middles of the cells (CELLS, 3), in the order of `_cell`."""
-    steps = (np.arange(_STEPS) + 0.5) * (2.0 / _STEPS) - 1.0
-    u, v = np.repeat(steps, _STEPS), np.tile(steps, _STEPS)
-    faces = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            face = np.empty((_STEPS * _STEPS, 3))
-            face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = sign, u, v
-            faces.append(face)
-    return np.concatenate(faces)
-
-
-@leaf_kernel
-def _cell(x: float, y: float, z: float) -> int:
-    """Return the cell of a direction: the cube's face that it meets, and the square on it."""
-    ax, ay, az = abs(x), abs(y), abs(z)
-    if ax >= ay and ax >= az:
-        face, top, u, v = (0 if x >= 0.0 else 1), ax, y, z
-    elif ay >= az:
-        face, top, u, v = (2 if y >= 0.0 else 3), ay, z, x
-    else:
-        face, top, u, v = (4 if z >= 0.0 else 5), az, x, y
-    if not 0.0 < top < np.inf:
-        return 0
-    scale = 0.5 * _STEPS / top
-    row, column = int(u * scale + 0.5 * _STEPS), int(v * scale + 0.5 * _STEPS)
-    return (face * _STEPS + min(max(row, 0), _STEPS - 1)) * _STEPS + min(max(column, 0), _STEPS - 1)
-
-
-@leaf_kernel
-def farthest_by_climbing(sets: Sets, k: int, x: float, y: float, z: float, hint: int) -> int:
-    """Return the vertex of set k (its row in `vertices`) that is farthest along (x, y, z), for a set with adjacency.
-
-    It is climbed, from the table's start or the row `hint` if that is farther, over ever farther neighbours; on a
-    convex set that ends at the farthest vertex to within rounding.
+    Args:
+        vertices: (v, 3) [m], finite.
+        first: (m + 1,), at least one vertex a set.
+        tables: whether sets of many vertices get tables, which pay after some hundred queries.
     """
-    begin, end = sets.first[k], sets.first[k + 1]
-    start = begin + sets.starts[sets.table[k], _cell(x, y, z)]
-    if begin <= hint < end and _height(sets.vertices, hint, x, y, z) > _height(sets.vertices, start, x, y, z):
-        start = hint
-    return _climb(sets.vertices, sets.neighbors_first, sets.neighbors, begin, start, x, y, z)
+    vertices = np.ascontiguousarray(vertices)
+    flat, counts = vertices.reshape(-1), np.diff(first)
+    side, table, margin = np.zeros_like(counts), np.zeros_like(counts), np.zeros(len(counts))
+    cells, candidates = [], []
+    cell_count = candidate_count = 0
+    for k in np.flatnonzero(counts > FEW) if tables else ():
+        begin, end = first[k], first[k + 1]
+        margin[k] = MARGIN * float(np.abs(vertices[begin:end]).max())
+        starts, listed = _table(flat, begin, end, margin[k])
+        side[k], table[k] = round(np.sqrt(len(starts) // 8)), cell_count
+        cells.append(starts + candidate_count)
+        candidates.append(listed)
+        cell_count, candidate_count = cell_count + len(starts), candidate_count + len(listed)
+    none = [np.zeros(0, dtype=np.int64)]
+    return Sets(
+        vertices=vertices,
+        flat=flat,
+        first=first,
+        center=np.add.reduceat(vertices, first[:-1]) / counts[:, None],
+        side=side,
+        table=table,
+        margin=margin,
+        cells=np.concatenate(none + cells),
+        candidates=np.concatenate(none + candidates),
+    )
 
 
-@leaf_kernel
-def _height(vertices: Floats, i: int, x: float, y: float, z: float) -> float:
-    height: float = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
+def _table(flat: Floats, begin: int, end: int, margin: float) -> tuple[Integers, Integers]:
+    """Return the starts (8 N N + 1,) of each cell's list and the lists, of vertex rows begin:end."""
+    side, starts, listed = 0, np.array([0, end - begin], dtype=np.int64), np.arange(begin, end, dtype=np.int64)
+    while side < 8 or (3 * side * side < end - begin and side < 64):
+        side = max(1, 2 * side)
+        finer = np.empty(8 * side * side + 1, dtype=np.int64)
+        found = np.empty(_list_cells(flat, side, margin, starts, listed, finer, listed[:0]), dtype=np.int64)
+        _list_cells(flat, side, margin, starts, listed, finer, found)
+        starts, listed = finer, found
+    return starts, listed
+
+
+@kernel
+def _list_cells(
+    flat: Floats, side: int, margin: float, starts: Integers, listed: Integers, finer: Integers, found: Integers
+) -> int:
+    """Write the starts of each cell's list, and the lists if `found` has room; return their total length.
+
+    `starts` and `listed` are those of half the side, or one list for all cells of side 1.
+    """
+    count, half = 0, side // 2
+    for cell in range(8 * side * side):
+        octant, row, column = cell // (side * side), cell // side % side, cell % side
+        finer[cell] = count
+        if row + column > side:  # no direction; on the border u + v = 1 there may be one
+            continue
+        parent = 0 if half == 0 else (octant * half + row // 2) * half + column // 2
+        top, best = -np.inf, listed[starts[parent]]
+        for e in range(starts[parent], starts[parent + 1]):
+            x, y, z = _direction(octant, (row + 1.0 / 3.0) / side, (column + 1.0 / 3.0) / side)
+            height = _height(flat, listed[e], x, y, z)
+            if height > top:
+                top, best = height, listed[e]
+        for e in range(starts[parent], starts[parent + 1]):
+            i = listed[e]
+            kept = False
+            for corner in range(4):
+                u, v = row + corner % 2, column + corner // 2
+                if u + v > side:
+                    continue
+                x, y, z = _direction(octant, u / side, v / side)
+                kept = kept or _height(flat, i, x, y, z) >= _height(flat, best, x, y, z) - margin
+            if kept:
+                if count < len(found):
+                    found[count] = i
+                count += 1
+    finer[8 * side * side] = count
+    return count
+
+
+@inlined_kernel
+def _direction(octant: int, u: float, v: float) -> tuple[float, float, float]:
+    """Return the direction at (u, v) of an octant."""
+    w = 1.0 - u - v
+    return -u if octant & 1 else u, -v if octant & 2 else v, -w if octant & 4 else w
+
+
+@inlined_kernel
+def _cell(side: int, x: float, y: float, z: float) -> int:
+    """Return the cell of a direction."""
+    octant = (1 if x < 0.0 else 0) + (2 if y < 0.0 else 0) + (4 if z < 0.0 else 0)
+    total = abs(x) + abs(y) + abs(z)
+    if not 1e-290 < total < 1e290:  # NaN, and what would overflow below
+        return 0
+    scale = side / total
+    row, column = min(int(abs(x) * scale), side - 1), min(int(abs(y) * scale), side - 1)
+    return (octant * side + row) * side + column
+
+
+@inlined_kernel
+def _height(flat: Floats, i: int, x: float, y: float, z: float) -> float:
+    height: float = flat[3 * i] * x + flat[3 * i + 1] * y + flat[3 * i + 2] * z
     return height
 
 
-@leaf_kernel
-def farthest_of_all(vertices: Floats, begin: int, end: int, x: float, y: float, z: float) -> int:
-    """Return the row of vertices[begin:end] that is farthest along (x, y, z), the first of equals."""
-    best = begin
-    top = -np.inf
-    for i in range(begin, end):
-        height = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
-        if height > top:
-            top = height
-            best = i
-    return best
+@inlined_kernel
+def candidates(sets: Sets, table: int, side: int, x: float, y: float, z: float) -> tuple[int, int]:
+    """Return begin and end in `sets.candidates` of the vertices that may be farthest along (x, y, z)."""
+    cell = table + _cell(side, x, y, z)
+    return sets.cells[cell], sets.cells[cell + 1]
 
 
-@leaf_kernel
-def _climb(
-    vertices: Floats,
-    neighbors_first: Integers,
-    neighbors: Integers,
-    begin: int,
-    start: int,
-    x: float,
-    y: float,
-    z: float,
-) -> int:
-    best = start
-    top = vertices[best, 0] * x + vertices[best, 1] * y + vertices[best, 2] * z
-    centre = -1
-    while centre != best:
-        centre = best
-        for e in range(neighbors_first[centre], neighbors_first[centre + 1]):
-            i = begin + neighbors[e]
-            height = vertices[i, 0] * x + vertices[i, 1] * y + vertices[i, 2] * z
+@inlined_kernel
+def farthest(sets: Sets, begin: int, end: int, table: int, side: int, x: float, y: float, z: float) -> int:
+    """Return the row in begin:end of `vertices` that is farthest along (x, y, z), for the set with that table."""
+    best, top = begin, -np.inf
+    if side > 0:
+        low, high = candidates(sets, table, side, x, y, z)
+        for e in range(low, high):
+            i = sets.candidates[e]
+            height = _height(sets.flat, i, x, y, z)
             if height > top:
-                top = height
-                best = i
+                top, best = height, i
+        return best
+    for i in range(begin, end):
+        height = _height(sets.flat, i, x, y, z)
+        if height > top:
+            top, best = height, i
     return best

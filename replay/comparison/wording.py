@@ -45,11 +45,11 @@ def moment(at: Moment) -> str:
 
 def change(item: Change) -> str:
     """Return "name: old -> new", with what one run lacks as "-"."""
-    return f"{item.name}: {_shown(item.baseline)} -> {_shown(item.candidate)}"
+    return f"{item.name}: {shown(item.baseline)} -> {shown(item.candidate)}"
 
 
-def _shown(value: str | None) -> str:
-    """Return a value with digests cut to what tells them apart."""
+def shown(value: str | None) -> str:
+    """Return a value with digests cut to what tells them apart, and "-" for what a run lacks."""
     return "-" if value is None else re.sub(r"\b([0-9a-f]{12})[0-9a-f]{52}\b", r"\1...", value)
 
 
@@ -181,6 +181,8 @@ def summary(found: Difference) -> str:
         parts.append(f"{len(found.deciding)} of {count(found.compared, 'signal')} changed")
     if found.accepted:
         parts.append(f"{count(len(found.accepted), 'signal')} within the rules")
+    if found.expired:
+        parts.append(f"{count(len(found.expired), 'expired rule')} would have applied")
     if found.provenance:
         parts.append(f"{count(len(found.provenance), 'difference')} of provenance")
     return ", ".join(parts) or f"all {count(found.compared, 'signal')} equal in {count(found.frames.matched, 'frame')}"

@@ -13,26 +13,18 @@ from replay.geometry.hull import convex_hull
 from replay.geometry.solid import Solid
 from replay.geometry.tree import Tree, build_tree
 
-BRUTE_FORCE_VERTICES = 40
-"""Sets with more vertices than this carry their adjacency; below, looking at every vertex is as fast as climbing
-(measured: at 42 vertices a query costs the same either way)."""
-
 Array = NDArray[np.float64]
 
 
 class ConvexSets(NamedTuple):
     """A body as the union of m convex sets (convex pieces, or the triangles of its surface), in its link's frame.
 
-    Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. The vertices adjacent to vertex v on its set's hull
-    are `neighbors[neighbors_first[v]:neighbors_first[v + 1]]`, as indices within the set; a set whose ranges are empty
-    is searched by brute force. `surface` says that the sets are the surface triangles of a watertight body, so that a
-    body wholly inside another needs a point-in-solid test beside them.
+    Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. `surface` says that the sets are the surface
+    triangles of a watertight body, so that a body wholly inside another needs a point-in-solid test beside them.
     """
 
     vertices: NDArray[np.float64]  # (v, 3) [m]
     first: NDArray[np.int64]  # (m + 1,)
-    neighbors_first: NDArray[np.int64]  # (v + 1,)
-    neighbors: NDArray[np.int64]  # (e,)
     tree: Tree  # over the sets' boxes
     surface: bool
 
@@ -66,20 +58,13 @@ def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "e
 
 def from_pieces(pieces: Sequence[Array]) -> ConvexSets:
     """Return the sets of convex pieces given by vertices (k, 3) [m]; vertices inside a piece's hull are left out."""
-    vertices, neighbors, degrees = [], [], []
-    for piece in pieces:
-        reduced, adjacent = _extreme_vertices(np.unique(np.asarray(piece, dtype=np.float64) + 0.0, axis=0))
-        vertices.append(reduced)
-        neighbors += adjacent
-        degrees += [len(k) for k in adjacent]
-    first = _running_total([len(k) for k in vertices])
+    vertices = [_extreme_vertices(np.unique(np.asarray(piece, dtype=np.float64) + 0.0, axis=0)) for piece in pieces]
+    first = np.concatenate([[0], np.cumsum([len(k) for k in vertices])]).astype(np.int64)
     lower = np.array([k.min(axis=0) for k in vertices])
     upper = np.array([k.max(axis=0) for k in vertices])
     return ConvexSets(
         vertices=np.concatenate(vertices),
         first=first,
-        neighbors_first=_running_total(degrees),
-        neighbors=np.array([k for adjacent in neighbors for k in adjacent], dtype=np.int64),
         tree=build_tree(lower, upper, leaf_size=1),
         surface=False,
     )
@@ -90,33 +75,12 @@ def _from_triangles(solid: Solid) -> ConvexSets:
     return ConvexSets(
         vertices=triangles.reshape(-1, 3),
         first=np.arange(0, 3 * len(triangles) + 1, 3, dtype=np.int64),
-        neighbors_first=np.zeros(3 * len(triangles) + 1, dtype=np.int64),
-        neighbors=np.zeros(0, dtype=np.int64),
         tree=build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=1),
         surface=solid.watertight,
     )
 
 
-def _extreme_vertices(points: Array) -> tuple[Array, list[list[int]]]:
-    """Return the vertices of the points' hull and, for many of them, each one's neighbours on the hull.
-
-    A linear function that is not largest at a vertex of a polytope is larger at one of the vertex's neighbours, so
-    climbing along edges ends at the support point. Hull faces are triangulated, which only adds edges.
-    """
+def _extreme_vertices(points: Array) -> Array:
+    """Return the vertices of the points' hull; of flat points all."""
     hull = convex_hull(points)
-    if hull is None:  # flat: every point is kept
-        return points, [[] for _ in points]
-    count = len(hull.vertices)
-    adjacent: list[set[int]] = [set() for _ in range(count)]
-    if count > BRUTE_FORCE_VERTICES:
-        place = np.zeros(len(points), dtype=np.int64)
-        place[hull.vertices] = np.arange(count)
-        for a, b, c in place[hull.faces].tolist():
-            adjacent[a] |= {b, c}
-            adjacent[b] |= {a, c}
-            adjacent[c] |= {a, b}
-    return points[hull.vertices], [sorted(k) for k in adjacent]
-
-
-def _running_total(counts: Sequence[int]) -> NDArray[np.int64]:
-    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
+    return points if hull is None else points[hull.vertices]

@@ -11,11 +11,11 @@ import io
 import struct
 import zlib
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from replay.errors import RecordingError
+from replay.logs.loss import Loss
 from replay.logs.mcap_chunks import Run, mixed_runs, records, regular_run, unpack
 from replay.logs.mcap_records import (
     MAGIC,
@@ -34,19 +34,6 @@ from replay.logs.mcap_records import (
     read_chunk,
     read_schema,
 )
-
-
-@dataclass(frozen=True)
-class Loss:
-    """What a salvaged file has lost.
-
-    Attributes:
-        reason: what is wrong, and where.
-        bytes: bytes at the end of the file that could not be used.
-    """
-
-    reason: str
-    bytes: int
 
 
 class McapLog:
@@ -98,6 +85,11 @@ class McapLog:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def preamble_checked(self) -> bool:
+        """Whether everything before the first chunk is there and as it was written; so in any whole recording."""
+        return any(name == PREAMBLE for name, _ in self.metadata)
 
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
@@ -185,10 +177,10 @@ class McapLog:
         head = self._bytes_at(at, RECORD_HEAD) if at + RECORD_HEAD <= self._size else b""
         op, length = struct.unpack("<BQ", head) if head else (0, 0)
         if not head or at + RECORD_HEAD + length > self._size:
+            hint = "" if self._salvage else "; `replay info` and `replay export` salvage what is whole"
             raise RecordingError(
                 self._file,
-                f"is cut at byte {self._size}, inside the record at byte {at}: its run was stopped, or it is damaged;"
-                " `replay info` and `replay export` salvage what is whole",
+                f"cut at byte {self._size}, in the record at byte {at}: its run was stopped, or it is damaged{hint}",
             )
         if length > MAX_RECORD:
             raise self._damage(

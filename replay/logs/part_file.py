@@ -12,6 +12,9 @@ from replay.errors import NoSpaceError, RecordingExistsError, WriteError
 
 _NO_SPACE = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT") if hasattr(errno, name)}  # the second: a quota's
 
+UNFINISHED = ".part"
+"""What the name of a file ends in while it is written."""
+
 
 class PartFile:
     """A binary file written as NAME.part, made durable and renamed to NAME when it is complete.
@@ -29,13 +32,13 @@ class PartFile:
             WriteError: the file cannot be created.
         """
         self.path = path
-        self.part = path.with_name(path.name + ".part")
+        self.part = path.with_name(path.name + UNFINISHED)
         if path.exists() and not overwrite:
             raise RecordingExistsError(str(path))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._stream: BinaryIO = self.part.open("wb")
-        except OSError as error:
+        except (OSError, UnicodeEncodeError) as error:
             raise write_error(path, error) from None
 
     def write(self, data: bytes | memoryview) -> None:
@@ -97,8 +100,10 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path
     return path
 
 
-def write_error(path: Path, error: OSError) -> WriteError:
+def write_error(path: Path, error: OSError | UnicodeEncodeError) -> WriteError:
     """Return the WriteError that says why the system refused `path`: a NoSpaceError when the disk is full."""
+    if isinstance(error, UnicodeEncodeError):
+        return WriteError(str(path), f"names of files are {error.encoding} here; LC_ALL=C.UTF-8 allows any")
     in_the_way = next((folder for folder in path.parents if folder.exists() and not folder.is_dir()), None)
     if in_the_way is not None:
         return WriteError(str(path), f"{in_the_way} is a file where a folder is needed")

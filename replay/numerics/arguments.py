@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,8 @@ def as_floats(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Flo
         InvalidValue: it holds something else than real numbers (text, complex numbers, truth values, objects, rows of
             different lengths), or it has another shape.
     """
+    if _fits(value, shape):
+        return cast(Floats, value)
     wanted = (
         "(" + ", ".join("n" if length is None else str(length) for length in shape) + ("," * (len(shape) == 1)) + ")"
     )
@@ -39,6 +41,17 @@ def as_floats(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Flo
     if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
         raise InvalidValue(name, f"array of shape {array.shape}", f"must have shape {wanted}")
     return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _fits(value: ArrayLike, shape: tuple[int | None, ...]) -> bool:
+    """Return whether a value is such an array already, as in a loop over many calls."""
+    if type(value) is not np.ndarray or value.dtype != np.float64 or value.ndim != len(shape):
+        return False
+    return value.flags.c_contiguous and all(map(_as_wanted, shape, value.shape))
+
+
+def _as_wanted(want: int | None, got: int) -> bool:
+    return want is None or want == got
 
 
 def as_float(name: str, value: Any) -> float:

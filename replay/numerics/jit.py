@@ -121,6 +121,15 @@ def leaf_kernel(function: Function) -> Function:
     return dispatcher
 
 
+def inlined_kernel(function: Function) -> Function:
+    """Compile as `leaf_kernel` does, into the body of every caller."""
+    dispatcher = leaf_kernel(function)
+    options = getattr(dispatcher, "targetoptions", None)
+    if isinstance(options, dict):
+        options["forceinline"] = True
+    return dispatcher
+
+
 @lru_cache(maxsize=1)
 def _counting_is_optional() -> bool:
     """Return whether this numba knows the option of compiling without reference counting."""

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from replay.collision.columns import CollisionColumns
 from replay.errors import InvalidValue, RecordingError
 from replay.logs.columns import Topic, read_topics
-from replay.logs.mcap_reader import Loss, McapLog
+from replay.logs.loss import Loss
+from replay.logs.mcap_reader import McapLog
 from replay.numerics import transforms
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import read_events
@@ -88,6 +89,11 @@ class Recording:
         """The names behind the columns."""
         return self.provenance.layout
 
+    @property
+    def loss_text(self) -> str:
+        """What is wrong with a salvaged file and what is left of it, in words; "" for a whole one."""
+        return "" if self.loss is None else self.loss.text(len(self.time), self.provenance.frames)
+
 
 def read(path: str | Path, *, salvage: bool = False, topics: Collection[str] | None = None) -> Recording:
     """Return a recording.
@@ -125,7 +131,7 @@ class _Assembly:
         self._provenance = read_provenance(log)
         if log.loss is None and not log.checked:
             raise RecordingError(self._file, "damaged: a checksum that every recording has is missing")
-        if log.loss is not None and not any(name == "preamble" for name, _ in log.metadata):
+        if log.loss is not None and not log.preamble_checked:
             raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
         names = {channel.topic for channel in log.channels.values()}
         self._check_topics(names)

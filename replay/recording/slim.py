@@ -17,7 +17,7 @@ from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import PREAMBLE, RECORD_HEAD, Chunk, Op
 from replay.logs.mcap_writer import McapFileWriter
-from replay.logs.part_file import PartFile, write_file
+from replay.logs.part_file import UNFINISHED, PartFile, write_file
 from replay.recording.provenance import sha256
 from replay.recording.reader import read_provenance
 
@@ -75,11 +75,14 @@ def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
     """Return a recording's scenario: its name, its main file's name, and every file that it needs.
 
     Files that a slim recording lacks are taken from the folder `objects` that stands in one of the folders above it.
+    Of an unfinished recording (`.part`), what comes before its frames is enough.
 
     Raises:
         RecordingError: the recording cannot be read, or a file is not there or not the one that was used.
     """
-    with McapLog(recording) as log:
+    with McapLog(recording, salvage=recording.suffix == UNFINISHED) as log:
+        if log.loss is not None and not log.preamble_checked:
+            raise RecordingError(str(recording), f"nothing can be salvaged: {log.loss.reason}")
         provenance = read_provenance(log)
         files = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
     for name, digest in provenance.files.items():

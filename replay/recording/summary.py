@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from replay.logs.mcap_reader import Loss, McapLog
+from replay.logs.loss import Loss
+from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import Provenance
 from replay.recording.reader import read
 

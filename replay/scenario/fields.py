@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, StrictBool, StringConstraints, model_validator
@@ -34,10 +35,21 @@ TITLE_RULE = "must have 1 to 100 characters, must not start with '.' and must no
 MAX_TITLE_BYTES = 200  # file systems take names of 255 bytes, and ".mcap.part" is added to it
 
 
+_DEVICES = ("CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10)))
+_INVISIBLE = re.compile("[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]")
+"""Marks that turn the direction of writing, break the line or show nothing: two names would look the same."""
+
+
 def _fits_file_systems(title: str) -> str:
     size = len(title.encode())
     if size > MAX_TITLE_BYTES:
         raise rejected(f"takes {size} bytes as the name of a file; at most {MAX_TITLE_BYTES} fit everywhere")
+    if title.partition(".")[0].rstrip().upper() in _DEVICES:
+        raise rejected("is a device on Windows, where recordings may be looked at; add a word to it")
+    if title != title.strip() or title.endswith("."):
+        raise rejected("must not begin or end with a space, nor end with '.'; some file systems drop them")
+    if hidden := _INVISIBLE.search(title):
+        raise rejected(f"must not hold the invisible character U+{ord(hidden.group()):04X}")
     return title
 
 

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,9 +14,11 @@ import pytest
 
 from replay.batch.case import Status
 from replay.batch.run import Execution, Unwatched, run_all
+from replay.cli.exit_codes import ExitCode
 from replay.errors import WorkerError
 from tests.batch import scenes
 from tests.batch.test_run import files_of
+from tests.cli.test_regress import check_verdicts, night, prepare
 
 ROOT = Path(__file__).parents[2]
 
@@ -72,6 +75,32 @@ def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path
     run_all(scenarios, here, rrd=False, execution=Execution(workers=2, **limits))
     assert files_of(there) == files_of(here)
     assert all(result.recordings is None or result.recordings.mcap.is_file() for result in run.results)
+
+
+@pytest.mark.soak
+def test_a_night_of_two_hundred_on_a_cluster_that_loses_a_worker(cluster, tmp_path, monkeypatch):
+    address, workers = cluster
+    counts = {"plain": 175, "bad": 5, "differing": 10}
+    prepare(tmp_path, **counts)
+    local = files_of(tmp_path / "first")
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    out = tmp_path / "night"
+
+    def kill():
+        while len(list(out.glob("*/result.json"))) < 60:
+            time.sleep(0.1)
+        workers[0].send_signal(signal.SIGKILL)
+
+    threading.Thread(target=kill, daemon=True).start()
+    before = {process.pid for process in psutil.Process(workers[1].pid).children(recursive=True)}
+    assert night(tmp_path, out, "--dask", address, "--rrd", "none") is ExitCode.FAILED
+    assert workers[0].wait() == -signal.SIGKILL
+    check_verdicts(out, **counts)
+    assert {process.pid for process in psutil.Process(workers[1].pid).children(recursive=True)} == before
+    there = files_of(out)
+    same = [name for name in local if name.parts[0].startswith("plain")]
+    assert len(same) == 2 * counts["plain"]
+    assert all(there[name] == local[name] for name in same)
 
 
 def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path, monkeypatch):

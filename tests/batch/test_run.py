@@ -14,6 +14,7 @@ import pytest
 
 from replay.batch.case import Status
 from replay.batch.cost import expected_cost
+from replay.batch.prepare import needs_of
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, NoSpaceError, RecordingExistsError
@@ -33,7 +34,8 @@ class Remarks(Unwatched):
         self.said = []
 
     def tell(self, text):
-        self.said.append(text)
+        if not text.startswith("compiling"):  # whether kernels are in the cache is not what is tested here
+            self.said.append(text)
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +105,15 @@ def test_kernels_are_all_compiled_before_the_first_scenario(model, tmp_path):
         subprocess.run([sys.executable, "-c", code], check=True, env=environment, capture_output=True, input=given)
         counts.append(len(list(tmp_path.rglob("*.nb[ic]"))))
     assert counts[0] == counts[1] > 20
+
+
+def test_a_sweep_of_numbers_needs_its_kernels_once():
+    models = [Model.model_validate({"capacitive": {"rtol": rtol}}) for rtol in (1e-3, 1e-6)]
+    models += [Model.model_validate({"distance": {"method": "rays", "count": count}}) for count in (10, 20)]
+    scene, meshes = scenes.scene("a"), scenes.with_meshes()
+    found = {need for model in models for need in needs_of([scene, scene, meshes], model)}
+    assert len(found) == 4  # two methods, with and without meshes
+    assert sum(need.meshes for need in found) == 2
 
 
 def test_resuming_reuses_what_is_still_valid_and_says_why_it_runs_the_rest(ran, tmp_path):

@@ -105,6 +105,18 @@ def test_validate_says_place_value_rule_and_remedy(tmp_path, capsys):
     assert "60 cm" in error
 
 
+def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        "version: 1\nname: many\nrate: 10\nduration: 1\nlinks: {a: {shapes: {s: {type: cube, size: 1}}}}\n"
+        f"sweep: {{grid: {{links.a.shapes.s.size: {[-k for k in range(1000)]}}}}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.INVALID
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 101
+    assert lines[-1] == "replay: error: ... and 900 more"
+
+
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
     entry = json.loads(capsys.readouterr().out)[0]
@@ -145,15 +157,44 @@ def test_info_lists_topics_counts_and_provenance(recorded, capsys):
 def test_info_salvages_a_cut_file_with_exit_code_3(recorded, tmp_path, capsys):
     data = (recorded / "swing.mcap").read_bytes()
     part = tmp_path / "swing.mcap.part"
-    part.write_bytes(data[: len(data) * 9 // 10])
+    part.write_bytes(data[: len(data) // 2])
     assert run(["info", str(part)]) is ExitCode.LOSSES
-    assert "salvaged" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith(f"replay: {part}: cut at byte") and said.endswith("; none of 61 frames were salvaged\n")
     cut = tmp_path / "cut.mcap"  # a copy that was stopped, say
     cut.write_bytes(part.read_bytes())
     assert run(["info", str(cut)]) is ExitCode.LOSSES
     assert run(["export", str(cut), "--format", "csv", "-o", str(tmp_path), "--topic", "/tf"]) is ExitCode.LOSSES
+    cut.write_bytes(data[:-20])
+    capsys.readouterr()
+    assert run(["info", str(cut)]) is ExitCode.LOSSES
+    assert capsys.readouterr().err.endswith("; all 61 frames were salvaged\n")
     cut.write_bytes(data[:30])
     assert run(["info", str(cut)]) is ExitCode.INVALID
+
+
+def test_a_stopped_run_is_run_again_from_what_it_left(recorded, tmp_path, capsys):
+    data = (recorded / "swing.mcap").read_bytes()
+    part = tmp_path / "swing.mcap.part"
+    part.write_bytes(data[: len(data) * 9 // 10])
+    assert run(["run", str(part), "-o", str(tmp_path), "--no-rrd"]) is ExitCode.FINE
+    assert (tmp_path / "swing" / "swing.mcap").read_bytes() == data
+    part.write_bytes(data[:900])
+    assert run(["run", str(part), "-o", str(tmp_path), "--overwrite"]) is ExitCode.INVALID
+    assert "nothing can be salvaged" in capsys.readouterr().err
+    assert run(["run", str(recorded / "swing.rrd"), "-o", str(tmp_path)]) is ExitCode.INVALID
+    assert "the .mcap beside it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_name_that_the_terminal_cannot_show_is_shown_as_escapes(recorded, tmp_path, encoding):
+    named = tmp_path / "bone 🦴.mcap"
+    named.write_bytes((recorded / "swing.mcap").read_bytes())
+    command = [sys.executable, "-m", "replay", "info", str(named)]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.startswith(str(tmp_path).encode())
 
 
 def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
@@ -221,7 +262,7 @@ def test_a_crash_fails_its_scenario_and_no_other(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(replay.batch.run, "run_case", scenes.misbehave)
     assert run(["run", str(tmp_path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FAILED
     text = capsys.readouterr().out
-    assert "raise_first: crashed" in text and "crashed: MemoryError: no room for 8 GiB" in text
+    assert "raise_first: crashed" in text and "MemoryError: no room for 8 GiB" in text
     assert "second: passed" in text
     folder = tmp_path / "out" / "raise_first"
     assert "Traceback" in (folder / "log.txt").read_text()

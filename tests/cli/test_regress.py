@@ -62,18 +62,23 @@ def check_night(tmp_path, monkeypatch, *, plain, bad, differing):
     monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
     out = tmp_path / "night"
     assert night(tmp_path, out) is ExitCode.FAILED
-    counted = {"plain": "same", "differ": "different", "crash": "crashed", "hang": "timeout", "eat": "memory"}
-    found = verdicts_of(out)
-    assert found == {name: counted[name.split("_")[0]] for name in found}
-    assert len(found) == plain + 3 * bad + differing
-    tags = {"same": "pass", "different": "failure"}
-    assert junit_of(out) == {name: tags.get(verdict, "error") for name, verdict in found.items()}
+    check_verdicts(out, plain, bad, differing)
     assert {process.pid for process in psutil.Process().children(recursive=True)} == before
     for kind in ("crash", "hang", "eat"):
         for k in range(bad):
             (tmp_path / "in" / f"{kind}_{k}.yaml").unlink()
     assert night(tmp_path, out) is ExitCode.DIFFERENT
     return out
+
+
+def check_verdicts(out, plain, bad, differing):
+    """Check that run.json and junit.xml give each scenario the verdict of its name."""
+    counted = {"plain": "same", "differ": "different", "crash": "crashed", "hang": "timeout", "eat": "memory"}
+    found = verdicts_of(out)
+    assert found == {name: counted[name.split("_")[0]] for name in found}
+    assert len(found) == plain + 3 * bad + differing
+    tags = {"same": "pass", "different": "failure"}
+    assert junit_of(out) == {name: tags.get(verdict, "error") for name, verdict in found.items()}
 
 
 def test_a_night_gives_exactly_the_verdicts_of_its_scenarios(tmp_path, monkeypatch, capsys):
@@ -117,7 +122,7 @@ def test_filters_missing_and_unused_baselines(tmp_path, capsys):
     (tmp_path / "in" / f"{made}.yaml").unlink()
     capsys.readouterr()
     assert night(tmp_path, out, "--missing-baseline", "skip", "--rrd", "none") is ExitCode.FINE
-    assert f"unused baseline: {made}" in capsys.readouterr().out
+    assert f"1 unused baseline, of no scenario given: {made}" in capsys.readouterr().out
     assert f"<li><code>{made}</code>" in (out / "index.html").read_text()
     assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
 
@@ -129,6 +134,7 @@ def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     accept = ["accept", str(out), "--baseline", str(base)]
     assert run(["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd"]) is ExitCode.FINE
     assert run([*accept, "--yes", "--reason", "first"]) is ExitCode.FINE
+    assert "no --reason" not in capsys.readouterr().err
     assert run([*accept, "--yes"]) is ExitCode.FINE
     assert "0 to be accepted, 2 unchanged" in capsys.readouterr().out
     scenes.write(tmp_path / "in", "a", distance=1.3)

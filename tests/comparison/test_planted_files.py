@@ -12,6 +12,7 @@ import pytest
 import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
+from replay.comparison import wording
 from replay.comparison.difference import Verdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.runs import read_pair
@@ -82,9 +83,8 @@ def check(folder, capsys, a, b, line, *more, finding, verdict="different"):
     assert name == (item["signal"]["full_name"] if kind == "signals" else item.get("name") or item["topic"])
     assert [other for other in kinds if case[other]] == [kind]
     shown = unescape(re.sub("<[^>]+>", "", html))
-    for part in (
-        [line] if kind in ("signals", "missing", "extra") else [name, item["baseline"], item["candidate"] or "-"]
-    ):
+    values = [name, *(wording.shown(item.get(side)) for side in ("baseline", "candidate"))]
+    for part in [line] if kind in ("signals", "missing", "extra") else values:
         assert part in shown
     failures = ElementTree.parse(junit).getroot().findall(".//failure")
     assert len(failures) == (verdict == "different")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from replay.errors import InvalidValue
 from replay.geometry import primitives
-from replay.geometry.convex import BRUTE_FORCE_VERTICES, convex_sets
+from replay.geometry.convex import convex_sets
 from replay.geometry.solid import Solid, signed_volume
 from replay.numerics import transforms
 
@@ -165,24 +165,9 @@ def test_convex_sets_cover_the_solid(name: str) -> None:
         count = 1 if pieces == "hull" else len(solid.pieces)
         assert len(sets.first) == count + 1 and sets.first[-1] == len(sets.vertices)
         assert not sets.surface
-        assert len(sets.neighbors_first) == len(sets.vertices) + 1
         for k in range(count):
             vertices = sets.vertices[sets.first[k] : sets.first[k + 1]]
             expected = solid.vertices if pieces == "hull" else solid.pieces[k]
             for direction in np.random.default_rng(k).normal(size=(30, 3)):
                 best = np.max(vertices @ direction)
                 assert best == pytest.approx(np.max(expected @ direction), rel=1e-14)
-                if len(vertices) > BRUTE_FORCE_VERTICES:
-                    assert climb(sets, k, direction) == pytest.approx(best, rel=1e-14)
-
-
-def climb(sets, k: int, direction: np.ndarray) -> float:
-    base = sets.first[k]
-    at = 0
-    while True:
-        near = sets.neighbors[sets.neighbors_first[base + at] : sets.neighbors_first[base + at + 1]]
-        heights = sets.vertices[base + near] @ direction
-        here = sets.vertices[base + at] @ direction
-        if heights.max() <= here:
-            return float(here)
-        at = near[np.argmax(heights)]

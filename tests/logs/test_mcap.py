@@ -90,9 +90,9 @@ bomb = zstandard.compress(bytes(MAX_CHUNK + 1))
     [
         (b"", "not an MCAP file"),
         (b"\x7fELF" + bytes(100), "not an MCAP file"),
-        (MAGIC, "is cut at byte 8"),
-        (HEADER, "is cut"),
-        (HEADER + struct.pack("<BQ", Op.CHUNK, 2**63), "is cut"),
+        (MAGIC, "cut at byte 8"),
+        (HEADER, "cut at"),
+        (HEADER + struct.pack("<BQ", Op.CHUNK, 2**63), "cut at"),
         (MAGIC + record(Op.CHUNK, b""), "not a header"),
         (MAGIC + record(Op.HEADER, struct.pack("<I", 2**32 - 1)), "ends inside a value"),
         (MAGIC + record(Op.HEADER, struct.pack("<I", 2) + b"\xff\xfe"), "not UTF-8"),
