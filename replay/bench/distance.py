@@ -53,10 +53,10 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
 
     Args:
         quick: fewer queries, and no bundle of 10 000 rays; about a minute.
-        rounds: times that every contender is timed; 7, or 3 when quick, if None.
+        rounds: times that every contender is timed; 5, or 3 when quick, if None.
         meshes: which of `MESHES`.
     """
-    rounds = rounds or (3 if quick else 7)
+    rounds = rounds or (3 if quick else 5)
     counts = RAY_COUNTS[:-1] if quick else RAY_COUNTS
     report = Report("distance")
     for name in meshes:
@@ -65,7 +65,7 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
         except MissingPackageError as error:
             report.tables[name] = [absent(name, EXACT, str(error))]
             continue
-        rows = on_mesh(name, triangles, queries=12 if quick else 60, counts=counts, rounds=rounds)
+        rows = on_mesh(name, triangles, queries=12 if quick else 24, counts=counts, rounds=rounds)
         report.tables[name] = rows
         report.plots.append(_plot(name, rows))
     rows = report.tables.get(LARGE, [])
