@@ -45,12 +45,14 @@ from replay.sensing.capacitive.refinement import (
 )
 from replay.sensing.capacitive.triangle_rules import (
     NO_RULE,
+    PART_ABOVE,
     PIECES,
     POINTS_1,
     RULE_POINTS,
     borders,
     cheapest_rule,
     mean_by_rule,
+    part_above,
     triangle_within,
 )
 from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
@@ -61,7 +63,7 @@ Flags = NDArray[np.bool_]
 
 _EFFORT_INNER, _EFFORT_LEAF, _EFFORT_RULE, _EFFORT_CUT = 1.0, 1.7, 0.5, 4.0
 _FIRST_PARTS = 16.0
-_HARD_SHARE = 1.0 / 256.0
+_HARD_SHARE = 1.0 / 128.0
 
 
 class Room(NamedTuple):
@@ -197,7 +199,7 @@ def _sum_one(
                 continue
             share = 0.0 if touches else max(0.0, _HARD_SHARE * (0.5 * rtol * least - spent))
             value, error = triangle_within(
-                corners, areas[k], parts[k, SPREAD], parts[k, REACH], half_x, half_y, both, share, room.whole, room.scratch, room.terms
+                corners, areas[k], half_x, half_y, both, share, room.whole, room.scratch, room.terms
             )
             if value == math.inf:
                 return math.inf, True, 0.0
@@ -280,7 +282,11 @@ def _judge_triangle(
         if max(heights) < 0.0:
             return DROP, NO_RULE
         if min(heights) <= 0.0:
-            return OPEN, NO_RULE
+            if first != POINTS_1 or min(heights) == 0.0 or (facing and not faces_centre(corners)):
+                return OPEN, NO_RULE
+            value, error = part_above(corners, areas[k], parts[k, SPREAD], h, half_x, half_y)
+            found[ERROR], found[SHIFT], found[LEAST] = error, value, max(0.0, value - error)
+            return KEEP if error <= allowed else OPEN, PART_ABOVE
     u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
     r = math.sqrt(u * u + v * v + z * z)
     if r <= CLOSEST * h:
@@ -332,6 +338,8 @@ def _evaluate(
             value = clusters.nodes[part, AREA] * mean + queue.values[slot, SHIFT]
         elif rule == POINTS_1:
             value = clusters.areas[part] / r
+        elif rule == PART_ABOVE:
+            value = queue.values[slot, SHIFT]
         else:
             into_plate(T, clusters.triangles, part, room.corners)
             mean = mean_by_rule(rule, room.corners, 0, x, y, half_x, half_y, room.terms)

@@ -14,7 +14,8 @@ from replay.sensing.capacitive.exact import integral_over_triangle
 
 Floats = NDArray[np.float64]
 
-POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE = range(5)
+POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE, PART_ABOVE = range(6)
+"""What a triangle is summed by: points; or by one point, the part of it that is above z = 0."""
 
 _RULE_3, _RULE_7, _RULE_16 = 0.12, 0.065, 0.005
 """Error constants of the point rules, twice the worst of 20 000 triangles (slivers too) at h/r = 0.06..0.5 in regions
@@ -24,8 +25,12 @@ near: 0.056, 0.031 and 0.002 were the worst."""
 RULE_POINTS = 16
 """Most points of a rule."""
 
-PIECES = 16
-"""Most pieces of one triangle: each of five planes replaces a piece by at most three, one after the other."""
+PIECES = 32
+"""Most pieces of one triangle: each of five planes replaces a piece by at most three, one after the other, and each of
+_QUARTERINGS replaces one by four."""
+
+_QUARTERINGS = 3
+"""Pieces of a triangle that are cut in four, when they are too near for a rule, before the closed form is called for."""
 
 
 @leaf_kernel
@@ -148,8 +153,6 @@ def borders(
 def triangle_within(
     pieces: Floats,
     area: float,
-    spread: float,
-    h: float,
     half_x: float,
     half_y: float,
     both: bool,
@@ -164,10 +167,6 @@ def triangle_within(
     form of the whole is called for. `pieces` (PIECES, 4, 3) holds the triangle's corners, then the pieces' corners and,
     last, their areas.
     """
-    if not both and min(pieces[0, 0, 2], pieces[0, 1, 2], pieces[0, 2, 2]) < 0.0:
-        value, error = _part_above(pieces, area, spread, h, half_x, half_y)
-        if error <= allowed:
-            return value, error
     for k in range(3):
         for axis in range(3):
             whole[k, axis] = pieces[0, k, axis]
@@ -177,6 +176,7 @@ def triangle_within(
         size = _cut(pieces, 1, 2, half_x, half_y)
     share = allowed / area if area > 0.0 else 0.0
     total, spent = 0.0, 0.0
+    quartered = 0
     while size > 0:
         last = size - 1
         part = pieces[last, 3, 0]
@@ -193,7 +193,11 @@ def triangle_within(
             largest = max(largest, square)
         h = math.sqrt(largest)
         if r <= CLOSEST * h:
-            break
+            if r <= 0.75 * h or quartered == _QUARTERINGS:
+                break
+            quartered += 1
+            size = _quarter(pieces, size)
+            continue
         shift, doubt, by_x = borders(pieces, last, part, x, y, h, r, half_x, half_y)
         rule, error = cheapest_rule(POINTS_1, part, squares / 12.0, h, r, doubt, share * part)
         if rule == POINTS_1:
@@ -202,6 +206,10 @@ def triangle_within(
             total += part * mean_by_rule(rule, pieces, last, x, y, half_x, half_y, terms) + shift
         elif doubt > 0.0 and rule_error(POINTS_16, part, squares / 12.0, h, r, 0.0) <= share * part:
             size = _cut(pieces, size, 0 if 2.0 * by_x >= doubt else 1, half_x, half_y)
+            continue
+        elif quartered < _QUARTERINGS:
+            quartered += 1
+            size = _quarter(pieces, size)
             continue
         else:
             break
@@ -213,10 +221,10 @@ def triangle_within(
 
 
 @leaf_kernel
-def _part_above(
+def part_above(
     pieces: Floats, area: float, spread: float, h: float, half_x: float, half_y: float
 ) -> tuple[float, float]:
-    """Return the integral over the part above z = 0 of a triangle that crosses it, by one point, and its error bound.
+    """Return the integral over the part above z = 0 of a triangle that crosses it, by one point, and its error bound [m].
 
     About its own centroid the part's integral of |d|^2 is less than that of the triangle about the triangle's.
     """
@@ -293,3 +301,20 @@ def _cut(pieces: Floats, size: int, axis: int, half_x: float, half_y: float) -> 
     return size
 
 
+
+
+@leaf_kernel
+def _quarter(pieces: Floats, size: int) -> int:
+    """Replace the last piece by four, cut from the middles of its edges; return the new number of pieces."""
+    last = size - 1
+    for axis in range(3):
+        a, b, c = pieces[last, 0, axis], pieces[last, 1, axis], pieces[last, 2, axis]
+        d, e, f = 0.5 * (b + c), 0.5 * (c + a), 0.5 * (a + b)
+        pieces[last, 1, axis], pieces[last, 2, axis] = f, e
+        pieces[size, 0, axis], pieces[size, 1, axis], pieces[size, 2, axis] = f, b, d
+        pieces[size + 1, 0, axis], pieces[size + 1, 1, axis], pieces[size + 1, 2, axis] = e, d, c
+        pieces[size + 2, 0, axis], pieces[size + 2, 1, axis], pieces[size + 2, 2, axis] = d, e, f
+    area = 0.25 * pieces[last, 3, 0]
+    for k in range(4):
+        pieces[last + k, 3, 0] = area
+    return size + 3
