@@ -26,11 +26,16 @@ LOWER, UPPER, NORMAL, OPENING, NEAREST_PLANE, FARTHEST_PLANE = 9, 12, 15, 18, 19
 PLACE, REACH, SPREAD = 0, 3, 4
 """Columns of `Clusters.parts`; PLACE is the first of three."""
 
-SECOND, THIRD, FOURTH = 0, 6, 24
-"""First columns of `Clusters.moments`: 6 for mean d_i d_j; 3 x 6 for mean d_k d_i d_j; 21 for mean d_i d_j d_k d_l, the
-upper triangle, row by row, of a 6 x 6 matrix. The six pairs ij are in the order of PAIRS."""
+SECOND, THIRD, FOURTH = 0, 6, 16
+"""First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4."""
 
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_KEPT = np.array(
+    [tuple(term.count(axis) for axis in "xyz") for term in (
+        "xx yy zz xy xz yz "
+        "xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz "
+        "xxxx yyyy zzzz xxyy xxzz yyzz xxxy xxxz yyyx yyyz zzzx zzzy xxyz yyxz zzxy"
+    ).split()]
+)
 
 
 class Clusters(NamedTuple):
@@ -50,19 +55,7 @@ class Clusters(NamedTuple):
     parts: Floats  # (n, 5)
     nodes: Floats  # (m, 24)
     widest: int  # most triangles of a leaf
-    moments: Floats  # (m, 45) [m^2, m^3, m^4], means over the area about the centroid
-
-
-def _powers(columns: tuple[int, ...]) -> tuple[int, int, int]:
-    return (columns.count(0), columns.count(1), columns.count(2))
-
-
-_KEPT = np.array(
-    [_powers(pair) for pair in PAIRS]
-    + [_powers((axis, *pair)) for axis in range(3) for pair in PAIRS]
-    + [_powers((*PAIRS[i], *PAIRS[j])) for i in range(6) for j in range(i, 6)]
-)
-"""(45, 3) powers of x, y and z of the columns of `Clusters.moments`."""
+    moments: Floats  # (m, 32) [m^2, m^3, m^4], means over the area about the centroid
 
 
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
@@ -72,7 +65,7 @@ def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
     offsets = ordered - ordered.mean(axis=1)[:, None]
     squares = np.sum(offsets**2, axis=2)
     parts = np.column_stack([ordered.mean(axis=1), np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0])
-    nodes, moments = np.zeros((len(tree.begin), 24)), np.zeros((len(tree.begin), 45))
+    nodes, moments = np.zeros((len(tree.begin), 24)), np.zeros((len(tree.begin), 32))
     _gather(ordered, areas, parts, tree.second, tree.begin, tree.end, nodes, moments)
     _enclose(ordered, areas, tree.begin, tree.end, nodes)
     nodes[:, LOWER:UPPER] = tree.lower - nodes[:, CENTROID:RADIUS]
