@@ -23,8 +23,8 @@ CENTROID, RADIUS, AREA, MEAN2, MEAN5, MEAN6, ODD5 = 0, 3, 4, 5, 6, 7, 8
 LOWER, UPPER, NORMAL, OPENING, NEAREST_PLANE, FARTHEST_PLANE = 9, 12, 15, 18, 19, 20
 """Columns of `Clusters.nodes`; CENTROID, LOWER, UPPER and NORMAL are the first of three."""
 
-PLACE, REACH, SPREAD = 0, 3, 4
-"""Columns of `Clusters.parts`; PLACE is the first of three."""
+PLACE, REACH, SPREAD, OUTWARD = 0, 3, 4, 5
+"""Columns of `Clusters.parts`; PLACE and OUTWARD are the first of three."""
 
 SECOND, THIRD, FOURTH = 0, 6, 16
 """First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4."""
@@ -46,13 +46,13 @@ class Clusters(NamedTuple):
     norm of the mean of d d d d d; its box, relative to the centroid [m]; the axis of a cone around its outward normals
     and the cosine of that cone's half angle (-1: anything may point anywhere); the least and the largest offset of its
     triangles' planes from the centroid, along their own normals [m].
-    A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m] and the mean of
-    |d|^2 [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are neighbours.
+    A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m], the mean of |d|^2
+    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are neighbours.
     """
 
     triangles: Floats  # (n, 3, 3) [m]
     areas: Floats  # (n,) [m^2]
-    parts: Floats  # (n, 5)
+    parts: Floats  # (n, 8)
     nodes: Floats  # (m, 24)
     widest: int  # most triangles of a leaf
     moments: Floats  # (m, 32) [m^2, m^3, m^4], means over the area about the centroid
@@ -64,7 +64,9 @@ def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
     areas = triangle_areas(ordered)
     offsets = ordered - ordered.mean(axis=1)[:, None]
     squares = np.sum(offsets**2, axis=2)
-    parts = np.column_stack([ordered.mean(axis=1), np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0])
+    outward = np.cross(ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0])
+    columns = [ordered.mean(axis=1), np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0, outward]
+    parts = np.ascontiguousarray(np.column_stack(columns))
     nodes, moments = np.zeros((len(tree.begin), 24)), np.zeros((len(tree.begin), 32))
     _gather(ordered, areas, parts, tree.second, tree.begin, tree.end, nodes, moments)
     _enclose(ordered, areas, tree.begin, tree.end, nodes)

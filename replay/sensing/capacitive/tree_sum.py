@@ -25,7 +25,7 @@ from replay.sensing.capacitive.cluster_bounds import (
     Z,
     judge_cluster,
 )
-from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, PLACE, REACH, SPREAD, Clusters
+from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, OUTWARD, PLACE, REACH, SPREAD, Clusters
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH
 from replay.sensing.capacitive.expansion import mean_by_moments
@@ -177,7 +177,7 @@ def _sum_one(
             else:
                 part, effort = task - first_triangle, _EFFORT_RULE
                 verdict, rule = _judge_triangle(
-                    triangles, areas, parts, part, T, half_x, half_y, both, facing, first, allowed, corners, found
+                    triangles, areas, parts, part, T, half_x, half_y, both, facing, centre, first, allowed, corners, found
                 )
                 if verdict == OPEN:
                     hard[count] = part
@@ -265,6 +265,7 @@ def _judge_triangle(
     half_y: float,
     both: bool,
     facing: bool,
+    centre: tuple[float, float, float],
     first: int,
     allowed: float,
     corners: Floats,
@@ -292,10 +293,13 @@ def _judge_triangle(
     if r <= CLOSEST * h:
         return OPEN, NO_RULE
     if facing:
-        if not placed:
-            into_plate(T, triangles, k, corners)
-            placed = True
-        if not faces_centre(corners):
+        side = _side_of_centre(parts, k, centre)
+        if side == OPEN:
+            if not placed:
+                into_plate(T, triangles, k, corners)
+                placed = True
+            side = KEEP if faces_centre(corners) else DROP
+        if side == DROP:
             return DROP, NO_RULE
     area, spread = areas[k], parts[k, SPREAD]
     shift, doubt = 0.0, 0.0
@@ -309,6 +313,18 @@ def _judge_triangle(
     found[X], found[Y], found[Z], found[R], found[ERROR], found[SHIFT] = x, y, z, r, error, shift
     found[LEAST] = area / math.sqrt(r * r + spread)
     return KEEP, rule
+
+
+@leaf_kernel
+def _side_of_centre(parts: Floats, k: int, centre: tuple[float, float, float]) -> int:
+    """Return KEEP when a triangle faces the plate's centre, DROP when not, OPEN when `faces_centre` may round it."""
+    a, b, c = parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2]
+    nx, ny, nz = parts[k, OUTWARD], parts[k, OUTWARD + 1], parts[k, OUTWARD + 2]
+    x, y, z = centre[0] - a, centre[1] - b, centre[2] - c
+    along = nx * x + ny * y + nz * z
+    extent = abs(a) + abs(b) + abs(c) + abs(centre[0]) + abs(centre[1]) + abs(centre[2]) + parts[k, REACH]
+    margin = (1e-9 * (abs(nx) + abs(ny) + abs(nz)) + 1e-13 * parts[k, REACH] * extent) * (abs(x) + abs(y) + abs(z))
+    return KEEP if along > margin else (DROP if along < -margin else OPEN)
 
 
 @leaf_kernel
