@@ -76,7 +76,7 @@ def test_moments_are_those_of_the_triangles(body):
         squares = (points**2).sum(axis=-1)
         scale = (weights * squares).sum()
         assert clusters.nodes[node, AREA] == pytest.approx(areas.sum(), rel=1e-12)
-        assert clusters.nodes[node, MEAN6] == pytest.approx((weights * squares**3).sum(), rel=5e-2)
+        assert clusters.nodes[node, MEAN6] == pytest.approx((weights * squares**3).sum(), rel=8e-2)
         assert clusters.nodes[node, MEAN5] >= (weights * squares**2.5).sum()
         fifth = np.einsum("np,npa,npb,npc,npd,npe->abcde", weights, *[points] * 5)
         assert clusters.nodes[node, ODD5] == pytest.approx(np.sqrt((fifth**2).sum()), abs=3e-2 * scale**2.5)
