@@ -43,6 +43,16 @@ _FIFTH = (math.sqrt(7.875), math.sqrt(4.203125), 1.0)
 
 
 @leaf_kernel
+def place(T: Floats, x: float, y: float, z: float) -> Triple:
+    """Return a point of the body in the plate's frame."""
+    return (
+        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
+        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
+        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
+    )
+
+
+@leaf_kernel
 def judge_cluster(
     nodes: Floats,
     moments: Floats,

@@ -29,13 +29,13 @@ PLACE, REACH, SPREAD, OUTWARD = 0, 3, 4, 5
 SECOND, THIRD, FOURTH = 0, 6, 16
 """First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4."""
 
-_KEPT = np.array(
-    [tuple(term.count(axis) for axis in "xyz") for term in (
-        "xx yy zz xy xz yz "
-        "xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz "
-        "xxxx yyyy zzzz xxyy xxzz yyzz xxxy xxxz yyyx yyyz zzzx zzzy xxyz yyxz zzxy"
-    ).split()]
+_TERMS = (
+    "xx yy zz xy xz yz "
+    "xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz "
+    "xxxx yyyy zzzz xxyy xxzz yyzz xxxy xxxz yyyx yyyz zzzx zzzy xxyz yyxz zzxy"
 )
+_KEPT = np.array([[term.count(axis) for axis in "xyz"] for term in _TERMS.split(" ")])
+"""(31, 3) powers of x, y and z of the columns of `Clusters.moments`."""
 
 
 class Clusters(NamedTuple):
@@ -47,7 +47,8 @@ class Clusters(NamedTuple):
     and the cosine of that cone's half angle (-1: anything may point anywhere); the least and the largest offset of its
     triangles' planes from the centroid, along their own normals [m].
     A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m], the mean of |d|^2
-    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are neighbours.
+    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so that
+    a node's triangles are neighbours.
     """
 
     triangles: Floats  # (n, 3, 3) [m]
@@ -59,7 +60,7 @@ class Clusters(NamedTuple):
 
 
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
-    """Return the clusters of triangles (n, 3, 3) [m] under their tree; sizes from 1e-45 to 1e45 m (see `Suite`)."""
+    """Return the clusters of triangles (n, 3, 3) [m] under their tree; their size must be from 1e-45 to 1e45 m."""
     ordered = np.ascontiguousarray(triangles[tree.order], dtype=np.float64)
     areas = triangle_areas(ordered)
     offsets = ordered - ordered.mean(axis=1)[:, None]

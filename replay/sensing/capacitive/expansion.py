@@ -83,4 +83,4 @@ def mean_by_moments(moments: Floats, index: int, T: Floats, u: float, v: float, 
     more += (a[1] * b[4] + a[4] * b[1] + a[3] * b[5] + a[5] * b[3]) * moments[index, FOURTH + 13]
     more += (a[2] * b[3] + a[3] * b[2] + a[4] * b[5] + a[5] * b[4]) * moments[index, FOURTH + 14]
     order4 = 35.0 / 8.0 * (order4 + more)
-    return inverse * (1.0 + inverse * inverse * (order2 - inverse * (order3 - inverse * order4)))
+    return inverse * (1.0 + inverse * inverse * (order2 - inverse * (order3 - inverse * order4)))  # type: ignore[no-any-return]

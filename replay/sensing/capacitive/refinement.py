@@ -62,8 +62,8 @@ def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> N
         queue.state[_USED] = slot + 1
     else:
         queue.state[_UNUSED] = queue.labels[slot, NEXT]
-    bucket = _BUCKET_OF_ONE + (np.float64(urgency).view(np.int64) >> _SHIFT) - _ONE
-    bucket = min(max(bucket, 0), BUCKETS - 1)
+    halves = int(np.float64(urgency).view(np.int64)) >> _SHIFT
+    bucket = min(max(_BUCKET_OF_ONE + halves - _ONE, 0), BUCKETS - 1)
     queue.labels[slot, PART], queue.labels[slot, RULE], queue.labels[slot, NEXT] = part, rule, queue.heads[bucket]
     queue.heads[bucket] = slot
     queue.state[_HIGHEST] = max(queue.state[_HIGHEST], bucket)

@@ -1,4 +1,32 @@
-"""TODO"""
+"""The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
+
+The tree is opened from the root until every part, a node or a triangle, has an error bound below what is allowed. From
+then on, as long as the bounds E add up to more than rtol times a lower bound of the sum, the part with the most error
+per effort is opened: a node into its children, a triangle into a rule of more points, and at last into pieces or the
+closed form. So the result meets rtol, and the work goes where it pays; what is small or far away may be relatively
+worse. The parts are summed at the end; nothing depends on other poses.
+
+Bounds. Let r be the distance components of the centroid in its region (u, v, z with the region's zeros), r its length,
+h the largest distance of a corner from the centroid, d a point's place about it, x = h/r < 2/3. Inside one region
+1/dist = 1/|r + Pd|, P dropping the region's zero components, and by Legendre's expansion
+
+    1/|r + Pd| = sum_k (-1)^k |Pd|^k P_k(cos) / r^(k+1),   |rest after order p| <= |d|^(p+1) / (r^(p+2) (1 - x)).
+
+- A cluster of area A takes orders 0, 2, 3, 4 from its moments (order 1 vanishes at the centroid). Order 5 is a form in
+  the mean of d d d d d, so it is at most the product of both Frobenius norms, and at most mean |d|^5:
+  E = A min(c |M5|, mean |d|^5)/r^6 + A mean |d|^6/(r^6 (r - h)); c^2 = 7.875, 4.203125 or 1 as P drops 0, 1 or 2.
+- Part of it may lie over a border, by w: there 1/dist is expanded in the wrong region's form, whose squared distance is
+  off by 0 to w^2, so the integral by 0 to B = A mean(w^2) / (2 (r - h)^3), of known sign: the sum is corrected by B/2,
+  and E += B/2. A point at d across the border, of at most D, lies over it by w <= d (W/D), W the largest w:
+  mean(w^2) <= min(W^2, (W/D)^2 mean(d^2)). No cluster is clipped for it. For a triangle mean(w^2) is known; it is off
+  by A mean(w^2)/2 times something between 1/(r + h)^3 and 1/(r - h)^3.
+- A triangle: 1 point, E = A spread/(r - h)^3, borders or not, as the Hessian of 1/dist is at most 2/dist^3, spread =
+  mean |d|^2; 3 points of degree 2, E = c A h spread/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4 spread/(r^7 (1 -
+  x)); 16 points of degree 8, E = c A h^7 spread/(r^10 (1 - x)); c see `triangle_rules`. Where a border or z = 0 is in
+  the way, the triangle is cut; a part above z = 0 has 1 point and a bound of its own (`part_above`).
+- The mean of 1/dist is at least 1/sqrt(mean dist^2) (Jensen), and mean dist^2 <= r^2 + mean |d|^2 (what is linear in
+  d vanishes): a part brings at least A/sqrt(r^2 + mean |d|^2).
+"""
 
 from __future__ import annotations
 
@@ -11,24 +39,11 @@ from numpy.typing import NDArray
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import (
-    CLOSEST,
-    DROP,
-    ERROR,
-    KEEP,
-    LEAST,
-    OPEN,
-    SHIFT,
-    R,
-    X,
-    Y,
-    Z,
-    judge_cluster,
-)
-from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, OUTWARD, PLACE, REACH, SPREAD, Clusters
+from replay.sensing.capacitive.cluster_bounds import ERROR, KEEP, LEAST, OPEN, judge_cluster, place
+from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, Clusters
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.expansion import mean_by_moments
+from replay.sensing.capacitive.part_sum import doubt_and_least, sum_of_parts
 from replay.sensing.capacitive.refinement import (
     BUCKETS,
     CLUSTER,
@@ -41,42 +56,37 @@ from replay.sensing.capacitive.refinement import (
     empty,
     pop,
     push,
-    slots_used,
 )
-from replay.sensing.capacitive.triangle_rules import (
-    NO_RULE,
-    PART_ABOVE,
-    PIECES,
-    POINTS_1,
-    RULE_POINTS,
-    borders,
-    cheapest_rule,
-    mean_by_rule,
-    part_above,
-    triangle_within,
-)
+from replay.sensing.capacitive.triangle_bounds import judge_triangle
+from replay.sensing.capacitive.triangle_cuts import PIECES, triangle_within
+from replay.sensing.capacitive.triangle_rules import POINTS_1, RULE_POINTS
 from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_EFFORT_INNER, _EFFORT_LEAF, _EFFORT_RULE, _EFFORT_CUT = 1.0, 1.7, 0.5, 4.0
+_EFFORT_INNER, _EFFORT_LEAF, _EFFORT_RULE = 1.0, 1.7, 0.5
+"""What it costs to open a node, a leaf, or to take a triangle's next rule, one against the other."""
+
 _FIRST_PARTS = 16.0
+"""A part with more than this fraction of the whole error is opened before the errors are compared."""
+
 _HARD_SHARE = 1.0 / 128.0
+"""What a triangle that has no rule may take of the half of the error that all such triangles may make."""
 
 
 class Room(NamedTuple):
     """Memory of one sum, used again for the next."""
 
     queue: Queue
-    stack: Ints
-    hard: Ints
-    found: Floats
-    corners: Floats
-    whole: Floats
-    scratch: Floats
-    terms: Floats
+    stack: Ints  # nodes to judge, and triangles, counted on from the last node
+    hard: Ints  # triangles without a rule
+    found: Floats  # (VALUES,)
+    corners: Floats  # (PIECES, 4, 3)
+    whole: Floats  # (3, 3)
+    scratch: Floats  # SCRATCH
+    terms: Floats  # (RULE_POINTS,)
 
 
 @kernel
@@ -176,8 +186,21 @@ def _sum_one(
                 part, rule, effort = task, CLUSTER, _EFFORT_INNER if inner else _EFFORT_LEAF
             else:
                 part, effort = task - first_triangle, _EFFORT_RULE
-                verdict, rule = _judge_triangle(
-                    triangles, areas, parts, part, T, half_x, half_y, both, facing, centre, first, allowed, corners, found
+                verdict, rule = judge_triangle(
+                    triangles,
+                    areas,
+                    parts,
+                    part,
+                    T,
+                    half_x,
+                    half_y,
+                    both,
+                    facing,
+                    centre,
+                    first,
+                    allowed,
+                    corners,
+                    found,
                 )
                 if verdict == OPEN:
                     hard[count] = part
@@ -210,7 +233,7 @@ def _sum_one(
             continue
         if doubt + spent <= rtol * least:
             # once more, without the rounding of sums that went up and down
-            doubt, least = _doubt(queue, total - spent)
+            doubt, least = doubt_and_least(queue, total - spent)
             if doubt + spent <= rtol * least:
                 break
         slot = pop(queue)
@@ -233,133 +256,13 @@ def _sum_one(
             for k in range(tree.begin[part], tree.end[part]):
                 stack[size] = first_triangle + k
                 size += 1
-    total, lost = _evaluate(clusters, T, half_x, half_y, room, total, lost)
+    total, lost = sum_of_parts(clusters, queue, T, half_x, half_y, total, lost, corners, room.terms)
     return total + lost, touching, doubt + spent
 
 
 @leaf_kernel
 def _least_of_root(nodes: Floats, T: Floats, half_x: float, half_y: float) -> float:
-    x, y, z = _place(T, nodes[0, CENTROID], nodes[0, CENTROID + 1], nodes[0, CENTROID + 2])
+    x, y, z = place(T, nodes[0, CENTROID], nodes[0, CENTROID + 1], nodes[0, CENTROID + 2])
     u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
     square = u * u + v * v + z * z + nodes[0, MEAN2]
     return nodes[0, AREA] / math.sqrt(square) if square > 0.0 else 0.0
-
-
-@leaf_kernel
-def _place(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    return (
-        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
-        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
-        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
-    )
-
-
-@leaf_kernel
-def _judge_triangle(
-    triangles: Floats,
-    areas: Floats,
-    parts: Floats,
-    k: int,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    both: bool,
-    facing: bool,
-    centre: tuple[float, float, float],
-    first: int,
-    allowed: float,
-    corners: Floats,
-    found: Floats,
-) -> tuple[int, int]:
-    x, y, z = _place(T, parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2])
-    h = parts[k, REACH]
-    placed = False
-    if not both and z - h <= 0.0:
-        if z + h < 0.0:
-            return DROP, NO_RULE
-        into_plate(T, triangles, k, corners)
-        placed = True
-        heights = (corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
-        if max(heights) < 0.0:
-            return DROP, NO_RULE
-        if min(heights) <= 0.0:
-            if first != POINTS_1 or min(heights) == 0.0 or (facing and not faces_centre(corners)):
-                return OPEN, NO_RULE
-            value, error = part_above(corners, areas[k], parts[k, SPREAD], h, half_x, half_y)
-            found[ERROR], found[SHIFT], found[LEAST] = error, value, max(0.0, value - error)
-            return KEEP if error <= allowed else OPEN, PART_ABOVE
-    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
-    r = math.sqrt(u * u + v * v + z * z)
-    if r <= CLOSEST * h:
-        return OPEN, NO_RULE
-    if facing:
-        side = _side_of_centre(parts, k, centre)
-        if side == OPEN:
-            if not placed:
-                into_plate(T, triangles, k, corners)
-                placed = True
-            side = KEEP if faces_centre(corners) else DROP
-        if side == DROP:
-            return DROP, NO_RULE
-    area, spread = areas[k], parts[k, SPREAD]
-    shift, doubt = 0.0, 0.0
-    if abs(abs(x) - half_x) < h or abs(abs(y) - half_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
-        if not placed:
-            into_plate(T, triangles, k, corners)
-        shift, doubt, _ = borders(corners, 0, area, x, y, h, r, half_x, half_y)
-    rule, error = cheapest_rule(first, area, spread, h, r, doubt, allowed)
-    if rule == NO_RULE:
-        return OPEN, rule
-    found[X], found[Y], found[Z], found[R], found[ERROR], found[SHIFT] = x, y, z, r, error, shift
-    found[LEAST] = area / math.sqrt(r * r + spread)
-    return KEEP, rule
-
-
-@leaf_kernel
-def _side_of_centre(parts: Floats, k: int, centre: tuple[float, float, float]) -> int:
-    """Return KEEP when a triangle faces the plate's centre, DROP when not, OPEN when `faces_centre` may round it."""
-    a, b, c = parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2]
-    nx, ny, nz = parts[k, OUTWARD], parts[k, OUTWARD + 1], parts[k, OUTWARD + 2]
-    x, y, z = centre[0] - a, centre[1] - b, centre[2] - c
-    along = nx * x + ny * y + nz * z
-    extent = abs(a) + abs(b) + abs(c) + abs(centre[0]) + abs(centre[1]) + abs(centre[2]) + parts[k, REACH]
-    margin = (1e-9 * (abs(nx) + abs(ny) + abs(nz)) + 1e-13 * parts[k, REACH] * extent) * (abs(x) + abs(y) + abs(z))
-    return KEEP if along > margin else (DROP if along < -margin else OPEN)
-
-
-@leaf_kernel
-def _doubt(queue: Queue, least: float) -> tuple[float, float]:
-    doubt = 0.0
-    for slot in range(slots_used(queue)):
-        if queue.labels[slot, RULE] != FREE:
-            doubt += queue.values[slot, ERROR]
-            least += queue.values[slot, LEAST]
-    return doubt, least
-
-
-@leaf_kernel
-def _evaluate(
-    clusters: Clusters, T: Floats, half_x: float, half_y: float, room: Room, total: float, lost: float
-) -> tuple[float, float]:
-    queue = room.queue
-    for slot in range(slots_used(queue)):
-        rule, part = queue.labels[slot, RULE], queue.labels[slot, PART]
-        if rule == FREE:
-            continue
-        x, y, z, r = queue.values[slot, X], queue.values[slot, Y], queue.values[slot, Z], queue.values[slot, R]
-        if rule == CLUSTER:
-            u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
-            v = y - math.copysign(half_y, y) if abs(y) > half_y else 0.0
-            mean = mean_by_moments(clusters.moments, part, T, u, v, z, r)
-            value = clusters.nodes[part, AREA] * mean + queue.values[slot, SHIFT]
-        elif rule == POINTS_1:
-            value = clusters.areas[part] / r
-        elif rule == PART_ABOVE:
-            value = queue.values[slot, SHIFT]
-        else:
-            into_plate(T, clusters.triangles, part, room.corners)
-            mean = mean_by_rule(rule, room.corners, 0, x, y, half_x, half_y, room.terms)
-            value = clusters.areas[part] * mean + queue.values[slot, SHIFT]
-        total, e = two_sum(total, value)
-        lost += e
-    return total, lost

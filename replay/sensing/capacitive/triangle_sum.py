@@ -37,12 +37,14 @@ def into_plate(T_plate_body: Floats, triangles: Floats, index: int, result: Floa
     for k in range(3):
         x, y, z = triangles[index, k, 0], triangles[index, k, 1], triangles[index, k, 2]
         for r in range(3):
-            result[0, k, r] = T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
+            result[0, k, r] = (
+                T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
+            )
 
 
 @leaf_kernel
 def faces_centre(corners: Floats) -> bool:
-    """Return whether the outer side of a triangle, corners[0] in the plate's frame, holds the plate's centre, n.(0 - a) > 0."""
+    """Return whether the outer side of corners[0], in the plate's frame, holds the plate's centre, n.(0 - a) > 0."""
     ax, ay, az = corners[0, 0, 0], corners[0, 0, 1], corners[0, 0, 2]
     bx, by, bz = corners[0, 1, 0] - ax, corners[0, 1, 1] - ay, corners[0, 1, 2] - az
     cx, cy, cz = corners[0, 2, 0] - ax, corners[0, 2, 1] - ay, corners[0, 2, 2] - az
