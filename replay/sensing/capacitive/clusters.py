@@ -47,8 +47,8 @@ class Clusters(NamedTuple):
     and the cosine of that cone's half angle (-1: anything may point anywhere); the least and the largest offset of its
     triangles' planes from the centroid, along their own normals [m].
     A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m], the mean of |d|^2
-    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so that
-    a node's triangles are neighbours.
+    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so
+    that a node's triangles are neighbours.
     """
 
     triangles: Floats  # (n, 3, 3) [m]

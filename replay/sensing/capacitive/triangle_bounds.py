@@ -64,7 +64,7 @@ def judge_triangle(
         if max(heights) < 0.0:
             return DROP, NO_RULE
         if min(heights) <= 0.0:
-            if first != POINTS_1 or min(heights) == 0.0 or (facing and not faces_centre(corners)):
+            if first != POINTS_1 or min(heights) * max(heights) == 0.0 or (facing and not faces_centre(corners)):
                 return OPEN, NO_RULE
             value, error = part_above(corners, areas[k], parts[k, SPREAD], h, half_x, half_y)
             found[ERROR], found[SHIFT], found[LEAST] = error, value, max(0.0, value - error)
