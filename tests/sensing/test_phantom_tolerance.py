@@ -13,7 +13,12 @@ from replay.sensing.capacitive.tree_sum import sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 _PLATE = np.array([[0.025, 0.1]])
-_REGIMES = {"touching": (1e-9, 0.01, 30.0), "near": (0.01, 0.1, 10.0), "middle": (0.1, 0.5, 60.0), "far": (0.5, 5.0, 90.0)}
+_REGIMES = {
+    "touching": (1e-9, 0.01, 30.0),
+    "near": (0.01, 0.1, 10.0),
+    "middle": (0.1, 0.5, 60.0),
+    "far": (0.5, 5.0, 90.0),
+}
 _ROUNDING = 1e-12
 """Relative rounding of two sums over 26 756 triangles."""
 
