@@ -54,7 +54,8 @@ class CapacitiveSuite:
     Raises:
         InvalidValue: an option is not as stated.
 
-    Accuracy: "tree" stays within rtol, by a bound (test_capacitive_tree; PHANTOMLINE).
+    Accuracy: "tree" stays within rtol, by a bound (test_capacitive_tree); on a phantom of 26 756
+            triangles, at 1 424 poses and rtol 1e-2 to 1e-9, within 0.51 rtol (test_phantom_tolerance).
     """
 
     def __init__(

@@ -86,11 +86,11 @@ def _mean_square(pieces: Floats, index: int, axis: int, sign: float, border: flo
         return 0.0
     middle = max(min(p, q), min(max(p, q), s))
     if middle <= 0.0:
-        return high * high / 6.0 * (high / (high - middle)) * (high / (high - low))
+        return high * high / 6.0 * (high / (high - middle)) * (high / (high - low))  # type: ignore[no-any-return]
     square = (p * p + q * q + s * s + (p + q + s) ** 2) / 12.0
     if low < 0.0:
         square -= low * low / 6.0 * (low / (low - middle)) * (low / (low - high))
-    return max(square, 0.0)
+    return max(square, 0.0)  # type: ignore[no-any-return]
 
 
 @leaf_kernel
