@@ -8,7 +8,7 @@ NIGHT := regress
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run regress accept test lint format type schemas pictures soak clean system
+.PHONY: help setup run regress accept test lint format type schemas bench pictures soak clean system
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## */\1\t/' | awk -F'\t' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -57,6 +57,11 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
 	$(BIN)/python -m replay.comparison.rules_file
 	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
+
+bench: setup  ## speed against error, ours and other engines' (some ten minutes); the report is recordings/bench/bench.html
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
+	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
+	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 
 pictures: $(VENV)/.test system  ## make the README's pictures, two of them from the recordings that `make run` left
 	mkdir -p scenarios/pictures

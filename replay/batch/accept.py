@@ -56,7 +56,8 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise InvalidValue("RUNDIR", directory, "is no run folder: it has no run.json of replay") from None
     if interrupted:
-        raise InvalidValue("RUNDIR", directory, "holds a run that was interrupted; run it again, or with --resume")
+        rule = "holds a run that was interrupted; run it again (`replay run --resume` keeps what is done)"
+        raise InvalidValue("RUNDIR", directory, rule)
     failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]
     if failed:
         raise InvalidValue("RUNDIR", directory, f"holds scenarios that did not pass: {', '.join(failed)}")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.logs.mcap_reader import McapLog
-from replay.logs.part_file import write_error
+from replay.logs.part_file import append_lines, write_error
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, write_slim
 
@@ -74,8 +74,7 @@ class Baseline:
                 "code": sorted(codes),
                 "scenarios": {name: entry.what for name, entry in entries.items()},
             }
-            with (self.directory / LOG).open("a", encoding="utf-8") as log_file:
-                log_file.write(json.dumps(line, ensure_ascii=False) + "\n")
+            append_lines(self.directory / LOG, [json.dumps(line, ensure_ascii=False)])
         except OSError as error:
             raise write_error(self.directory, error) from None
         finally:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from replay.errors import ReplayError, ScenarioError
+from replay.errors import NoSpaceError, ReplayError, ScenarioError
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.covered import CoveredSensors
 from replay.scenario.verdict import ExpectationCheck, Outcome
@@ -74,6 +74,7 @@ class CaseResult:
         memory: the most resident memory seen [bytes].
         notes: what a reader should know about the scene.
         reused: taken from an earlier run.
+        no_space: it failed because the disk is full.
     """
 
     name: str
@@ -88,6 +89,7 @@ class CaseResult:
     memory: int = 0
     notes: tuple[str, ...] = ()
     reused: bool = False
+    no_space: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """Return what result.json holds: nothing that depends on the machine, the clock or the folder."""
@@ -137,8 +139,14 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
-        invalid = isinstance(error, ScenarioError)
-        return CaseResult(scenario.name, Status.FAILED, error=str(error), invalid=invalid, seconds=seconds)
+        return CaseResult(
+            scenario.name,
+            Status.FAILED,
+            error=str(error),
+            invalid=isinstance(error, ScenarioError),
+            seconds=seconds,
+            no_space=isinstance(error, NoSpaceError),
+        )
     outcomes = tuple(check.finish())
     return CaseResult(
         scenario.name,

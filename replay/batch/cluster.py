@@ -139,6 +139,8 @@ def _unpacked(task: Task, future: Any) -> Ended:
     except WriteError as error:
         return Ended(task, Ending.CRASHED, None, str(error), parcel.ended.seconds, parcel.ended.memory)
     value = parcel.ended.value
+    if isinstance(value, CaseResult):
+        value = dataclasses.replace(value, no_space=False)  # the full disk is another machine's
     if isinstance(value, CaseResult) and value.recordings is not None:
         found = value.recordings
         moved = dataclasses.replace(found, mcap=folder / found.mcap.name, rrd=found.rrd and folder / found.rrd.name)

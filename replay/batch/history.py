@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.errors import WriteError
-from replay.logs.part_file import write_error
+from replay.logs.part_file import append_lines
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,7 @@ def append_night(path: Path, night: Night) -> None:
         "failing": sorted(night.failing),
         "verdicts": dict(night.verdicts),
     }
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry, ensure_ascii=False) + "\n")
-    except OSError as error:
-        raise write_error(path, error) from None
+    append_lines(path, [json.dumps(entry, ensure_ascii=False)])
 
 
 def failing_since(nights: list[Night], name: str) -> str | None:

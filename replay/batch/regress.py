@@ -87,7 +87,7 @@ def regress(
     except KeyboardInterrupt:
         run = dataclasses.replace(run, interrupted=True)
     for name in [name for name, item in judged.items() if item.verdict is Verdict.CREATED]:
-        if accepted.recording(name) is None:
+        if accepted.recording(name) is None:  # ended before it was stored
             del judged[name]
     ended = [
         judged.get(scenario.name) or _unjudged(scenario, result)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import datetime
+import errno
 import json
 import os
 import platform
@@ -26,7 +27,7 @@ from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import RESULT, earlier_result
 from replay.batch.watch import Unwatched, Watch
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError
-from replay.logs.part_file import write_error, write_file
+from replay.logs.part_file import append_lines, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -152,6 +153,8 @@ def run_all(
                 result = _finish(_result(ended), ended.task.payload.folder)
                 results[result.name] = result
                 watch.done(result)
+                if result.no_space:
+                    raise NoSpaceError(str(directory), os.strerror(errno.ENOSPC))
         interrupted = False
     except KeyboardInterrupt:
         for scenario in left:
@@ -217,18 +220,10 @@ def _finish(result: CaseResult, folder: Path) -> CaseResult:
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
     try:
         write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
-        _append(folder / "log.txt", describe(result))
+        append_lines(folder / "log.txt", describe(result))
     except WriteError as error:
         return dataclasses.replace(_unwritable(result.name, error), seconds=result.seconds, memory=result.memory)
     return result
-
-
-def _append(path: Path, lines: Sequence[str]) -> None:
-    try:
-        with path.open("a", encoding="utf-8") as file:
-            file.writelines(f"{line}\n" for line in lines)
-    except OSError as error:
-        raise write_error(path, error) from None
 
 
 def _unwritable(name: str, error: WriteError) -> CaseResult:

@@ -66,8 +66,8 @@ def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str]
         except MissingPackageError as error:
             report.tables[name] = [absent(name, "exact", str(error))]
             continue
-        poses = 24 if quick else 60
-        points = (8_000_000 if quick else 400_000_000) // (poses * len(triangles))
+        poses = 24 if quick else 40
+        points = (8_000_000 if quick else 100_000_000) // (poses * len(triangles))
         splits = [n for n in SPLITS if n <= 2 or 4**n <= points]
         report.tables[name] = on_body(name, triangles, poses=poses, splits=splits, rounds=rounds)
         report.plots.append(_plot(name, report.tables[name]))

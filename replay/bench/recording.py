@@ -31,7 +31,7 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
 
     Args:
         quick: fewer scenes; about ten seconds.
-        rounds: times that every run is timed; 5, or 3 when quick, if None.
+        rounds: times that every run is timed; 3 if None.
         scenes: names of shipped scenarios.
     """
     report = Report("recording")
@@ -42,7 +42,7 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
             rows.append(absent(name, PLAIN, found))
             continue
         for part in (found, finer(found)):
-            rows += on(part, rounds or (3 if quick else 5))
+            rows += on(part, rounds or 3)
     report.tables[TABLE] = rows
     times = {(row.case, row.method): row for row in rows if row.rounds}
     costs = [cost(times, name) for name in scenes if (name, BOTH) in times]

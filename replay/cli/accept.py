@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import note
 
@@ -37,5 +38,6 @@ def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
         reason = click.prompt("Why are they right?", err=True)
     if not reason:
         note("no --reason: the baseline's log will not say why")
+    interruption.settle()
     plan.commit(reason=reason, now=datetime.datetime.now(datetime.UTC))
     return ExitCode.FINE

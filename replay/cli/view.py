@@ -18,18 +18,19 @@ from replay.cli.exit_codes import ExitCode
 def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None, web: bool) -> ExitCode:
     """Show RECORDINGS (.rrd, or .mcap with its .rrd beside it) side by side in one viewer."""
     from replay.recording.picture import picture
+    from replay.recording.side_by_side import one_recording
     from replay.recording.viewer import rerun_files, show
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at belongs to --screenshot")
     if at is not None and not 0.0 <= at < math.inf:
         raise click.UsageError(f"--at {at:g} is no moment of a recording; give seconds from its start")
-    files = rerun_files(recordings)
-    if screenshot is None:
-        show(files, web=web)
-        return ExitCode.FINE
-    if web or len(files) > 1:
-        raise click.UsageError("--screenshot takes one recording, and not --web")
-    picture(files[0], screenshot, at=at)
-    click.echo(str(screenshot))
+    if screenshot is not None and web:
+        raise click.UsageError("--screenshot and --web exclude each other")
+    with one_recording(rerun_files(recordings)) as file:
+        if screenshot is None:
+            show(file, web=web)
+        else:
+            picture(file, screenshot, at=at)
+            click.echo(str(screenshot))
     return ExitCode.FINE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -60,6 +61,7 @@ def compare_groups(
 ) -> Iterator[result.SignalDifference]:
     """Yield how the signals that both groups have differ; nothing for a signal that is equal or ignored.
 
+    One that is ignored until a day is a known difference: it is told as long as it is there, and does not decide.
     A gate's disagreements are added to `gates`, for the groups behind it.
     """
     column_b = {signal: k for k, signal in enumerate(b.signals)}
@@ -77,7 +79,7 @@ def compare_groups(
         x, y = _take(values_a[:, k], frames.baseline), _take(values_b[:, j], frames.candidate)
         if a.field.open:
             _note_gate(gates, signal, a.field, x, y)
-        if tolerance.ignore:
+        if tolerance.ignore and (rule is None or rule.expires is None):
             continue
         echo = _echo(gates, signal, a.field)
         if a.field.kind.is_state:
@@ -86,7 +88,8 @@ def compare_groups(
             compare = compare_rotations if a.field.kind is Kind.ROTATION else compare_numbers
             found = _summarise(compare(x, y, tolerance), x, y, frames, echo, a.field.kind)
         if found is not None:
-            yield found(signal, rule)
+            item = found(signal, rule)
+            yield dataclasses.replace(item, decides=False) if tolerance.ignore else item
 
 
 def _changed(a: Column, b: Column, frames: MatchedFrames, columns_a: Indices, columns_b: Indices) -> Flags:

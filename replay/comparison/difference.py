@@ -80,7 +80,7 @@ class Event:
 
 @dataclass(frozen=True)
 class SignalDifference:
-    """How one signal differs; `decides` is false when the rules accept all of it.
+    """How one signal differs; `decides` is false when the rules accept all of it, or ignore it for now.
 
     Attributes:
         rule: the rule that was applied, None for exact.

@@ -151,7 +151,8 @@ def rule(item: Rule | None) -> str:
 def tolerance(item: Rule) -> str:
     """Return what a rule accepts, and where it is written."""
     default, given = EXACT, item.tolerance
-    parts = [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
+    parts = ["ignored"] if given.ignore else []
+    parts += [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
     parts += [f"time {seconds(given.time)}"] if given.time else []
     parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
     parts += [

@@ -8,6 +8,8 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
+_FOLD = 1e-6  # of a polygon's area: a triangle that turns back by less is the rounding of a straight edge
+
 
 def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the vertices (v, 3) and the triangles (f, 3) of an OBJ file.
@@ -16,9 +18,10 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     materials, points and lines are passed over.
 
     Raises:
-        ValueError: a vertex or a face is not as the format says; with its line.
+        ValueError: a vertex or a face is not as the format says, or a polygon is not convex; with its line.
     """
     vertices, corners = array("d"), array("q")
+    sizes, lines = array("q"), array("q")  # of each face, its triangles and its line
     text = data.decode(errors="replace").replace("\r\n", "\n")  # comments and names may be in any encoding
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), start=1):
         words = line.partition("#")[0].split()
@@ -32,6 +35,8 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
             first, *others = (_index(word, len(vertices) // 3) for word in words[1:])
             if len(others) < 2:
                 raise ValueError("a face needs three corners")
+            sizes.append(len(others) - 1)
+            lines.append(number)
             for second, third in itertools.pairwise(others):
                 corners.extend((first, second, third))
         except (ValueError, OverflowError):
@@ -40,7 +45,21 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     faces = np.array(corners, dtype=np.int64).reshape(-1, 3)
     if len(faces) and faces.max() >= len(vertices) // 3:
         raise ValueError(f"a face refers to vertex {faces.max() + 1}, and there are {len(vertices) // 3}")
-    return np.array(vertices, dtype=np.float64).reshape(-1, 3), faces
+    points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    if len(faces) > len(sizes):
+        _check_convex(points[faces], np.array(sizes), np.array(lines))
+    return points, faces
+
+
+def _check_convex(triangles: NDArray[np.float64], sizes: NDArray[np.int64], lines: NDArray[np.int64]) -> None:
+    """Refuse a polygon of which a triangle turns back over the others: it would cover what the polygon leaves free."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        whole = np.repeat(np.add.reduceat(normals, np.cumsum(sizes) - sizes), sizes, axis=0)
+        back = np.sum(normals * whole, axis=1) < -_FOLD * np.sum(whole * whole, axis=1)
+    if back.any():
+        line = np.repeat(lines, sizes)[int(np.argmax(back))]
+        raise ValueError(f"the polygon of line {line} is not convex and would be split wrongly; save it as triangles")
 
 
 def _index(word: str, before: int) -> int:

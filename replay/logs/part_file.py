@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -98,6 +99,23 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path
         file.discard()
         raise
     return path
+
+
+def append_lines(path: Path, lines: Iterable[str]) -> None:
+    """Append lines to a text file and make the folders that it needs; all of them or, with a WriteError, none."""
+    data = memoryview("".join(f"{line}\n" for line in lines).encode())
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("ab", buffering=0) as stream:
+            before = stream.tell()
+            try:
+                while data:
+                    data = data[stream.write(data) :]
+            except OSError:
+                stream.truncate(before)
+                raise
+    except OSError as error:
+        raise write_error(path, error) from None
 
 
 def write_error(path: Path, error: OSError | UnicodeEncodeError) -> WriteError:

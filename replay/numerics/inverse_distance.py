@@ -45,49 +45,15 @@ from replay.numerics.gauss import (
     WEIGHTS_16,
 )
 from replay.numerics.jit import kernel
+from replay.numerics.triples import UNDERFLOW, Triple, along, cross, dot, minus, norm
 
-Triple = tuple[float, float, float]
 Nodes = NDArray[np.float64]
 
 _FAR = 3.0
 """Distance of the centroid in longest edges from which a triangle is integrated by a Gauss rule."""
 
-_UNDERFLOW = 1e-280
-"""Below it a square has lost digits, or all of them."""
-
 _TINY = 1e-60
-"""Size below which a triangle is scaled up, so that fourth powers stay above _UNDERFLOW."""
-
-
-@kernel
-def _minus(a: Triple, b: Triple) -> Triple:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@kernel
-def _along(a: Triple, factor: float, b: Triple) -> Triple:
-    return (a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2])
-
-
-@kernel
-def _dot(a: Triple, b: Triple) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def _cross(a: Triple, b: Triple) -> Triple:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-@kernel
-def _norm(a: Triple) -> float:
-    square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    if square < _UNDERFLOW:
-        largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
-        if largest > 0.0:
-            x, y, z = a[0] / largest, a[1] / largest, a[2] / largest
-            return largest * math.sqrt(x * x + y * y + z * z)
-    return math.sqrt(square)
+"""Size below which a triangle is scaled up, so that fourth powers stay above UNDERFLOW."""
 
 
 @kernel
@@ -102,7 +68,7 @@ def _segment_integral(length: float, near: float, height: float, r_near: float, 
     if product >= 0.0:
         bracket = squared + r_near * r_far + product
     else:
-        if height > 0.0 and squared < _UNDERFLOW:
+        if height > 0.0 and squared < UNDERFLOW:
             # the same by logarithms, numerator and denominator over `far`
             gap = r_near * (r_far / far) - near
             ratio, steep = near / far, height / far
@@ -121,18 +87,18 @@ def _segment_integral(length: float, near: float, height: float, r_near: float, 
 @kernel
 def mean_over_segment(p: Triple, q: Triple) -> float:
     """Return the mean of 1/|r| [1/m] over the segment from p to q [m]; inf when it contains the origin."""
-    r_near, r_far = _norm(p), _norm(q)
+    r_near, r_far = norm(p), norm(q)
     if r_far < r_near:
         p, q = q, p
         r_near, r_far = r_far, r_near
     if r_near <= 0.0:
         return math.inf
-    edge = _minus(q, p)
-    length = _norm(edge)
+    edge = minus(q, p)
+    length = norm(edge)
     if length <= 1e-12 * r_near:
         return 2.0 / (r_near + r_far)
-    near = _dot(p, edge) / length
-    height = _norm(_cross(p, edge)) / length
+    near = dot(p, edge) / length
+    height = norm(cross(p, edge)) / length
     return _segment_integral(length, near, height, r_near, r_far) / length
 
 
@@ -141,10 +107,10 @@ def _gauss_mean(a: Triple, b: Triple, c: Triple, nodes: Nodes, weights: Nodes) -
     """Return the mean of 1/|r| over a triangle by the product rule collapsed into corner a."""
     total = 0.0
     for j in range(len(nodes)):
-        k = _along(_minus(b, a), nodes[j], _minus(c, b))
+        k = along(minus(b, a), nodes[j], minus(c, b))
         row = 0.0
         for i in range(len(nodes)):
-            row += weights[i] * nodes[i] / _norm(_along(a, nodes[i], k))
+            row += weights[i] * nodes[i] / norm(along(a, nodes[i], k))
         total += weights[j] * row
     return 2.0 * total
 
@@ -162,24 +128,24 @@ def _far_mean(a: Triple, b: Triple, c: Triple, ratio: float) -> float:
 @kernel
 def _ray_mean(e: Triple, f: Triple, c: Triple) -> float:
     """Return the mean of 1/|r| over a triangle with corner e far from its short edge from f to c."""
-    r_e = _norm(e)
-    short = _minus(c, f)
-    start = _minus(f, e)
+    r_e = norm(e)
+    short = minus(c, f)
+    start = minus(f, e)
     total = 0.0
     for j in range(len(NODES_12)):
-        k = _along(f, NODES_12[j], short)
-        ray = _along(start, NODES_12[j], short)
-        a = _norm(ray)
-        r_k = _norm(k)
+        k = along(f, NODES_12[j], short)
+        ray = along(start, NODES_12[j], short)
+        a = norm(ray)
+        r_k = norm(k)
         if r_k < r_e:
-            s_k = _dot(k, ray) / a
+            s_k = dot(k, ray) / a
             s_e = s_k - a
-            height = _norm(_cross(k, ray)) / a
+            height = norm(cross(k, ray)) / a
             integral = _segment_integral(a, -s_k, height, r_k, r_e)
         else:
-            s_e = _dot(e, ray) / a
+            s_e = dot(e, ray) / a
             s_k = s_e + a
-            height = _norm(_cross(e, ray)) / a
+            height = norm(cross(e, ray)) / a
             integral = _segment_integral(a, s_e, height, r_e, r_k)
         total += WEIGHTS_12[j] * ((s_e + s_k) / (r_e + r_k) - s_e * integral / a) / a
     return 2.0 * total
@@ -187,10 +153,10 @@ def _ray_mean(e: Triple, f: Triple, c: Triple) -> float:
 
 @kernel
 def _half_sliver_mean(e: Triple, f: Triple, c: Triple) -> float:
-    longest = max(_norm(_minus(e, f)), _norm(_minus(e, c)))
+    longest = max(norm(minus(e, f)), norm(minus(e, c)))
     if longest <= 0.0:
-        return 1.0 / _norm(e)
-    ratio = _norm(_along(_along(e, 1.0, f), 1.0, c)) / (3.0 * longest)
+        return 1.0 / norm(e)
+    ratio = norm(along(along(e, 1.0, f), 1.0, c)) / (3.0 * longest)
     if ratio > _FAR:
         return _far_mean(e, f, c, ratio)
     return _ray_mean(e, f, c)
@@ -219,12 +185,12 @@ def _closed_form(base: int, offset: Triple, length: float, foot: float, back: fl
 @kernel
 def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, across: float, depth: float) -> float:
     """Return what the edge from p to q = p + (along, across) adds to the closed form."""
-    length = _norm((along, across, 0.0))
+    length = norm((along, across, 0.0))
     if length <= 0.0:
         return 0.0
     tx, ty = along / length, across / length
-    r_p = _norm((p[0], p[1], depth))
-    r_q = _norm((q[0], q[1], depth))
+    r_p = norm((p[0], p[1], depth))
+    r_q = norm((q[0], q[1], depth))
     if r_p <= r_q:
         outward = p[0] * ty - p[1] * tx
         s_p = p[0] * tx + p[1] * ty
@@ -237,7 +203,7 @@ def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, acr
         return 0.0
     squared = outward * outward + depth * depth
     near = s_p if r_p <= r_q else -s_q
-    height = _norm((outward, depth, 0.0))
+    height = norm((outward, depth, 0.0))
     result = outward * _segment_integral(length, near, height, min(r_p, r_q), max(r_p, r_q))
     if depth > 0.0:
         result -= depth * math.atan2(outward * s_q, squared + depth * r_q)
@@ -247,7 +213,7 @@ def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, acr
 
 @kernel
 def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
-    ab, bc, ca = _norm(_minus(b, a)), _norm(_minus(c, b)), _norm(_minus(a, c))
+    ab, bc, ca = norm(minus(b, a)), norm(minus(c, b)), norm(minus(a, c))
     if bc >= ab and bc >= ca:
         a, b, c = b, c, a
         length = bc
@@ -256,7 +222,7 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
         length = ca
     else:
         length = ab
-    r_a, r_b, r_c = _norm(a), _norm(b), _norm(c)
+    r_a, r_b, r_c = norm(a), norm(b), norm(c)
     if r_a <= 0.0:
         return 2.0 * mean_over_segment(b, c)
     if r_b <= 0.0:
@@ -265,43 +231,43 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
         return 2.0 * mean_over_segment(a, b)
     if length <= 0.0:
         return 1.0 / r_a
-    ratio = _norm(_along(_along(a, 1.0, b), 1.0, c)) / (3.0 * length)
+    ratio = norm(along(along(a, 1.0, b), 1.0, c)) / (3.0 * length)
     if ratio > _FAR:
         return _far_mean(a, b, c, ratio)
-    t = _minus(b, a)
+    t = minus(b, a)
     t = (t[0] / length, t[1] / length, t[2] / length)
     # height of c over the longest edge, its foot measured from the nearer end; rounding may put it just beyond an end
-    from_a, from_b = _minus(c, a), _minus(c, b)
-    if _dot(from_a, from_a) <= _dot(from_b, from_b):
-        foot = _dot(from_a, t)
+    from_a, from_b = minus(c, a), minus(c, b)
+    if dot(from_a, from_a) <= dot(from_b, from_b):
+        foot = dot(from_a, t)
         back = foot - length
-        across = _along(from_a, -foot, t)
+        across = along(from_a, -foot, t)
     else:
-        back = _dot(from_b, t)
+        back = dot(from_b, t)
         foot = length + back
-        across = _along(from_b, -back, t)
-    across = _along(across, -_dot(across, t), t)
-    width = _norm(across)
+        across = along(from_b, -back, t)
+    across = along(across, -dot(across, t), t)
+    width = norm(across)
     # distance of the origin to the longest edge
     if r_a <= r_b:
-        s_a = _dot(a, t)
+        s_a = dot(a, t)
         s_b = s_a + length
-        height = _along(a, -s_a, t)
+        height = along(a, -s_a, t)
     else:
-        s_b = _dot(b, t)
+        s_b = dot(b, t)
         s_a = s_b - length
-        height = _along(b, -s_b, t)
-    distance = r_a if s_a > 0.0 else (r_b if s_b < 0.0 else _norm(height))
+        height = along(b, -s_b, t)
+    distance = r_a if s_a > 0.0 else (r_b if s_b < 0.0 else norm(height))
     if distance > 2.0 * width:
-        foot_point = _minus(c, across)
+        foot_point = minus(c, across)
         first = _half_sliver_mean(a, foot_point, c) if foot != 0.0 else 0.0
         second = _half_sliver_mean(b, foot_point, c) if back != 0.0 else 0.0
         return (foot * first - back * second) / length
     m = (across[0] / width, across[1] / width, across[2] / width)
-    n = _cross(t, m)
+    n = cross(t, m)
     base = 0 if r_a <= r_b and r_a <= r_c else (1 if r_b <= r_c else 2)
     nearest = a if base == 0 else (b if base == 1 else c)
-    offset = (_dot(nearest, t), _dot(nearest, m), _dot(nearest, n))
+    offset = (dot(nearest, t), dot(nearest, m), dot(nearest, n))
     return _closed_form(base, offset, length, foot, back, width) / (0.5 * length * width)
 
 

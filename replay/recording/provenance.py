@@ -63,7 +63,7 @@ class Provenance:
 
     def to_metadata(self) -> dict[str, str]:
         """Return the values of the MCAP metadata record, each as JSON with sorted keys."""
-        values = dataclasses.asdict(self)
+        values = vars(self) | {"layout": vars(self.layout)}
         return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
 
     @staticmethod

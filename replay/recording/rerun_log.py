@@ -206,11 +206,15 @@ class RerunWriter:
         for k in np.flatnonzero(rows.any(axis=0)).tolist():
             path = [chart, names[k]]
             if (chart, names[k]) not in self._named:
+                log_curve(self._stream, path, (titles or names)[k], self._number_of(chart))
                 self._named.add((chart, names[k]))
-                log_curve(self._stream, path, (titles or names)[k])
             here = rows[:, k]
             shown = np.where(present[here, k], values[here, k], np.nan)
             self._send(block, here, path, rr.Scalars.columns(scalars=shown))
+
+    def _number_of(self, chart: str) -> int:
+        """Return the number of the curve that is added to a chart next."""
+        return sum(named == chart for named, _ in self._named)
 
     def _log_events(self, block: FrameBlock) -> None:
         import rerun as rr

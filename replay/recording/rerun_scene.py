@@ -15,6 +15,17 @@ from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
 CONE = (110, 190, 255, 140)
 PLATE = (216, 140, 60, 255)
 BEAM = (255, 235, 90, 255)
+CURVES = (
+    (86, 180, 233),
+    (240, 165, 30),
+    (60, 205, 140),
+    (240, 105, 95),
+    (190, 140, 245),
+    (240, 225, 70),
+    (255, 150, 200),
+    (160, 165, 175),
+)
+"""Colours of curves, told apart on a dark ground."""
 
 Path = list[str]
 
@@ -57,11 +68,12 @@ def _log_plates(stream: Any, scene: SceneView) -> None:
         stream.log([*path, "outline"], outline, static=True)
 
 
-def log_curve(stream: Any, path: Path, name: str) -> None:
-    """Log how a curve is called in its chart."""
+def log_curve(stream: Any, path: Path, name: str, number: int) -> None:
+    """Log how a curve is called in its chart, and its colour: that of its number there."""
     import rerun as rr
 
-    stream.log(path, rr.SeriesLines(names=name, widths=1.5), static=True)
+    color = CURVES[number % len(CURVES)]  # the viewer's own colours follow from names and may be alike
+    stream.log(path, rr.SeriesLines(names=name, widths=1.5, colors=color), static=True)
 
 
 def extent(scene: SceneView, link_poses: Floats) -> Floats:

@@ -29,17 +29,17 @@ def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
     return files
 
 
-def show(files: Sequence[Path], *, web: bool = False) -> None:
-    """Open recordings in one viewer and wait until it is closed.
+def show(file: Path, *, web: bool = False) -> None:
+    """Open a recording in a viewer and wait until it is closed.
 
     Args:
-        files: `.rrd` files; several are shown side by side.
+        file: an `.rrd` file.
         web: serve the viewer to browsers on this machine (127.0.0.1 only) until interrupted.
 
     Raises:
         ViewerError: the viewer is not installed or fails, as it does without a display.
     """
-    command = [str(viewer_binary()), *map(str, files)]
+    command = [str(viewer_binary()), str(file)]
     if web:
         command += ["--web-viewer", "--bind", "127.0.0.1"]
     process = subprocess.Popen(command)

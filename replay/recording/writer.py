@@ -70,13 +70,21 @@ class McapWriter:
         self._scene_data = b""
 
     def prepare(self) -> None:
-        """Encode the scene; what else comes before the first block depends on it."""
+        """Write what does not depend on a block, and encode the scene."""
+        self._log = McapFileWriter(self._file, f"replay {self._provenance.version}")
+        self._log.metadata(RECORD, self._provenance.to_metadata())
+        for name, data in sorted(self._files.items()):
+            media_type = _MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
+            self._log.attachment(name, media_type, data)
         self._scene_data = scene_message(self._scene)
 
     def write(self, block: FrameBlock) -> None:
         """Append a block; the first one decides which groups of columns the recording has."""
         if self._log is None:
-            self._log = self._begin(block)
+            self.prepare()
+        assert self._log is not None
+        if not self._topics:
+            self._begin(self._log, block)
         events = self._events.find(block)
         self._log.messages(
             self._event_channel,
@@ -90,7 +98,7 @@ class McapWriter:
 
     def close(self) -> None:
         """Finish the recording and give the file its name; InvalidValue when no block was written."""
-        if self._log is None:
+        if self._log is None or not self._topics:
             raise InvalidValue("blocks", 0, "a recording needs at least one frame")
         self._log.finish()
         self._file.commit()
@@ -99,14 +107,7 @@ class McapWriter:
         """Give the recording up and remove the unfinished file."""
         self._file.discard()
 
-    def _begin(self, block: FrameBlock) -> McapFileWriter:
-        if not self._scene_data:
-            self.prepare()
-        log = McapFileWriter(self._file, f"replay {self._provenance.version}")
-        log.metadata(RECORD, self._provenance.to_metadata())
-        for name, data in sorted(self._files.items()):
-            media_type = _MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
-            log.attachment(name, media_type, data)
+    def _begin(self, log: McapFileWriter, block: FrameBlock) -> None:
         topics = list(
             frame_topics(
                 self._provenance.layout,
@@ -122,4 +123,3 @@ class McapWriter:
         self._topics = [(topic, log.channel(topic.name, schemas[topic.type])) for topic in topics]
         log.end_preamble()
         log.messages(scene, [0], [0], [self._scene_data])
-        return log

@@ -24,7 +24,7 @@ METHOD_REVISIONS: Final = {
     "distance.exact": 1,
     "distance.rays": 1,
     "distance.thesis": 1,
-    "capacitive.tree": 1,
+    "capacitive.tree": 2,
     "capacitive.exact": 1,
     "capacitive.midpoint": 1,
 }

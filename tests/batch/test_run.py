@@ -180,6 +180,16 @@ def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path):
     assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+def test_a_disk_that_is_full_for_a_recording_ends_the_run(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "a.mcap.part").symlink_to("/dev/full")
+    with pytest.raises(NoSpaceError, match="No space left"):
+        run_all([scenes.scene("a"), scenes.scene("b")], tmp_path, rrd=False, execution=Execution(workers=1))
+    assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True
+    assert not (tmp_path / "b" / "b.mcap").exists()
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal as a terminal does")
 def test_ctrl_c_ends_cleanly_with_a_partial_report_and_no_process_left(tmp_path):
     scenes.write(tmp_path / "in", "good")

@@ -230,6 +230,19 @@ def test_a_baseline_folder_that_cannot_be_written_is_told_in_the_reports(tmp_pat
     assert junit_of(tmp_path / "out") == {"a": "failure"}
 
 
+def test_a_recording_is_run_and_compared_again_by_the_command_on_the_page(tmp_path):
+    scenes.write(tmp_path / "in", "a")
+    assert run(["run", str(tmp_path / "in"), "-o", str(tmp_path / "old"), "--no-rrd"]) is ExitCode.FINE
+    old, out = tmp_path / "old" / "a" / "a.mcap", tmp_path / "out"
+    options = ["--baseline", str(tmp_path / "base"), "--rrd", "none", "--missing-baseline", "create"]
+    assert run(["regress", str(old), *options, "-o", str(out)]) is ExitCode.FINE
+    command = re.search("<pre class=.mono.>(replay regress .*)</pre>", (out / "index.html").read_text())[1].split()
+    assert command[:3] == ["replay", "regress", str(old)]
+    command[command.index("-o") + 1] = str(tmp_path / "again")
+    assert run(command[1:]) is ExitCode.FINE
+    assert verdicts_of(tmp_path / "again") == {"a": "same"}
+
+
 def test_rules_beside_the_scenarios_are_the_default(tmp_path):
     scenes.write(tmp_path / "in", "a")
     assert night(tmp_path, tmp_path / "out", "--missing-baseline", "create", "--rrd", "none") is ExitCode.FINE

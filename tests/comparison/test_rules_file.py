@@ -6,7 +6,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from replay.comparison import rules_file
+from replay.comparison import rules_file, wording
 from replay.comparison.diff import compare
 from replay.comparison.difference import Verdict
 from replay.comparison.rules import EXACT, Rule, Tolerance, literal_pattern
@@ -80,6 +80,28 @@ rules:
     assert [rule.reason for rule in found.expired] == ["known"]
     with pytest.raises(InvalidValue, match="today"):
         read_rules(path)
+
+
+def test_a_known_difference_is_told_as_long_as_it_is_there_and_lets_the_run_pass(tmp_path):
+    text = """
+rules_version: 1
+rules:
+  - {signal: "/tf/*", ignore: true, reason: new bearing, link: "https://example.org/7", expires: 2027-03-31}
+"""
+    path = written(tmp_path, text)
+    rules = read_rules(path, today=TODAY)
+    baseline = made_up.recording()
+
+    def move(recording):
+        recording.link_poses[5:9, 0, 2, 3] += 0.1
+
+    found = compare(baseline, made_up.altered(baseline, move), rules=rules)
+    assert found.verdict is Verdict.SAME
+    (item,) = found.accepted
+    assert (item.signal.full_name, item.frames, item.decides) == ("/tf/translation.z/arm", 4, False)
+    told = f"rule ignored ({path}:4:14), until 2027-03-31: new bearing (https://example.org/7)"
+    assert wording.rule(item.rule) == told
+    assert compare(baseline, made_up.recording(), rules=rules).signals == ()
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,19 @@ def test_obj_counts_back_from_where_a_face_stands_and_splits_polygons():
     np.testing.assert_array_equal(vertices[[4, 5]], [[0, 0, 1], [9, 9, 9]])
 
 
+U = ["0 0", "3 0", "3 2", "2 2", "2 1", "1 1", "1 2", "0 2"]
+
+
+def test_obj_polygons_are_convex_or_refused():
+    """A profile like the letter U, split from its first corner, would be filled."""
+    corners = "".join(f"v {corner} 0\n" for corner in U).encode()
+    assert "line 9 is not convex" in refused("u.obj", corners + b"f 1 2 3 4 5 6 7 8\n")
+    quads = corners + b"f 1 6 7 8\nf 1 2 5 6\nf 2 3 4 5\n"
+    assert trimesh.Trimesh(*read_faces("u.obj", quads)).area == pytest.approx(5.0)
+    straight = corners + b"v 1.5 0 0\nf 1 9 2 5 6\n"  # a corner on an edge
+    assert trimesh.Trimesh(*read_faces("u.obj", straight)).area == pytest.approx(2.0)
+
+
 def test_ply_of_quads_is_read_and_mixed_polygons_only_as_text():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     quad, triangle = struct.pack("<B4i", 4, 0, 1, 2, 3), struct.pack("<B3i", 3, 0, 1, 2)

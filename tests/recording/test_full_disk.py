@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from replay.errors import RecordingExistsError, WriteError
-from replay.logs.part_file import write_file
+from replay.logs.part_file import append_lines, write_file
 from replay.recording.behind import WriteBehind, Writer
 from replay.recording.export import FORMATS, export
 from replay.recording.reader import read
@@ -89,6 +89,15 @@ def test_other_files_are_whole_or_as_they_were(tmp_path: Path) -> None:
         with room_for(2000), pytest.raises(WriteError):
             export(recording, tmp_path / form, format=form, topics=["/tf"])
         assert list((tmp_path / form).iterdir()) == []
+
+
+def test_lines_are_appended_all_or_none(tmp_path: Path) -> None:
+    log = tmp_path / "sub" / "log.jsonl"
+    append_lines(log, ["one", "zwei ä"])
+    with room_for(500), pytest.raises(WriteError, match="File too large"):
+        append_lines(log, ["x" * 100] * 20)
+    append_lines(log, ["three"])
+    assert log.read_text(encoding="utf-8") == "one\nzwei ä\nthree\n"
 
 
 def test_links_and_devices_are_written_in_place(tmp_path: Path) -> None:

@@ -125,6 +125,26 @@ def test_a_machine_far_from_the_origin_reads_the_same():
     np.testing.assert_array_equal(here.capacitance, there.capacitance)
 
 
+@pytest.mark.parametrize("method", ["tree", "exact", "midpoint"])
+@pytest.mark.parametrize("faces", ["all", "facing"])
+def test_a_scene_of_any_size_reads_in_proportion(method, faces):
+    linkage = _linkage()
+    guard, body = linkage.link_index("guard"), linkage.link_index("body")
+
+    def run(size):
+        plate = Plate("front", transforms.identity(), size * np.array([0.05, 0.03]))
+        sensor = CapacitiveSensor("guard", guard, (plate,), coupling=1e-12, faces=faces)
+        target = make_target("body/ball", body, size * sphere(0.1, 0.004).triangles)
+        suite = CapacitiveSuite([sensor], [target], method=method, splits=1)
+        free = transforms.identity()[None, None].repeat(2, axis=1)
+        return suite.run(linkage.forward(size * np.array([[0.11]]), free)).capacitance[0, 0] / size
+
+    for size in (2.0**-400, 2.0**200):
+        assert run(size) == run(1.0) > 0.0
+    # squares of lengths vanish there, so the body's tree may be another one
+    assert run(2.0**-600) == pytest.approx(run(1.0), rel=1e-6)
+
+
 def test_frames_do_not_depend_on_each_other_and_a_dwell_repeats_the_reading():
     linkage, targets, sensor = _scene()
     suite = CapacitiveSuite([sensor], targets)

@@ -1,6 +1,6 @@
 """What a far cluster of triangles looks like to a plate: area, centroid and moments up to the fourth, per tree node.
 
-Computed once per body, in its own frame. A rule of degree 5 makes the moments of each triangle exact.
+Computed once per body, in its own frame, from the leaves to the root.
 """
 
 from __future__ import annotations
@@ -11,88 +11,189 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.tree import Tree
-from replay.numerics.gauss import TRIANGLE_7
-from replay.numerics.jit import kernel
+from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.numerics.jit import kernel, leaf_kernel
+from replay.sensing.capacitive.moments import DEGREE, add_moments, add_triangle_moments, move_moments
 from replay.sensing.capacitive.triangle_sum import triangle_areas
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-CENTROID, RADIUS, AREA, SPREAD4, LOWER, UPPER, NORMAL, OPENING = 0, 3, 4, 5, 6, 9, 12, 15
+CENTROID, RADIUS, AREA, MEAN2, MEAN5, MEAN6, ODD5 = 0, 3, 4, 5, 6, 7, 8
+LOWER, UPPER, NORMAL, OPENING, NEAREST_PLANE, FARTHEST_PLANE = 9, 12, 15, 18, 19, 20
 """Columns of `Clusters.nodes`; CENTROID, LOWER, UPPER and NORMAL are the first of three."""
 
-SECOND, THIRD, FOURTH = 0, 6, 24
-"""First columns of `Clusters.moments`: 6 for mean d_i d_j; 3 x 6 for mean d_k d_i d_j; 21 for mean d_i d_j d_k d_l, the
-upper triangle, row by row, of a 6 x 6 matrix. The six pairs ij are in the order of PAIRS."""
+PLACE, REACH, SPREAD, OUTWARD = 0, 3, 4, 5
+"""Columns of `Clusters.parts`; PLACE and OUTWARD are the first of three."""
 
-PAIRS = np.array([[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]])
+SECOND, THIRD, FOURTH = 0, 6, 16
+"""First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4."""
+
+_TERMS = (
+    "xx yy zz xy xz yz "
+    "xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz "
+    "xxxx yyyy zzzz xxyy xxzz yyzz xxxy xxxz yyyx yyyz zzzx zzzy xxyz yyxz zzxy"
+)
+_KEPT = np.array([[term.count(axis) for axis in "xyz"] for term in _TERMS.split(" ")])
+"""(31, 3) powers of x, y and z of the columns of `Clusters.moments`."""
 
 
 class Clusters(NamedTuple):
     """m tree nodes over n triangles, in the body's frame; one row per node keeps what a visit reads together.
 
     A node's row holds its centroid [m]; its radius [m], the largest distance of a corner from the centroid; its area
-    [m^2]; the mean of |d|^4 over its area [m^4], d from the centroid; its box, relative to the centroid [m]; the axis
-    of a cone around its outward normals and the cosine of that cone's half angle (-1: anything may point anywhere).
-    Triangles are listed in the order of the tree, so that a node's triangles are neighbours.
+    [m^2]; with d from the centroid, the means over the area of |d|^2, |d|^5 (an upper bound) and |d|^6; the Frobenius
+    norm of the mean of d d d d d; its box, relative to the centroid [m]; the axis of a cone around its outward normals
+    and the cosine of that cone's half angle (-1: anything may point anywhere); the least and the largest offset of its
+    triangles' planes from the centroid, along their own normals [m].
+    A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m], the mean of |d|^2
+    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so
+    that a node's triangles are neighbours.
     """
 
     triangles: Floats  # (n, 3, 3) [m]
     areas: Floats  # (n,) [m^2]
-    nodes: Floats  # (m, 16)
-    moments: Floats  # (m, 45) [m^2, m^3, m^4], means over the area about the centroid
+    parts: Floats  # (n, 8)
+    nodes: Floats  # (m, 24)
+    widest: int  # most triangles of a leaf
+    moments: Floats  # (m, 32) [m^2, m^3, m^4], means over the area about the centroid
 
 
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
-    """Return the clusters of triangles (n, 3, 3) [m] under their tree."""
+    """Return the clusters of triangles (n, 3, 3) [m] under their tree; their size must be from 1e-45 to 1e45 m."""
     ordered = np.ascontiguousarray(triangles[tree.order], dtype=np.float64)
     areas = triangle_areas(ordered)
-    nodes, moments = np.zeros((len(tree.begin), 16)), np.zeros((len(tree.begin), 45))
-    _measure(ordered, areas, tree.begin, tree.end, nodes, moments)
+    offsets = ordered - ordered.mean(axis=1)[:, None]
+    squares = np.sum(offsets**2, axis=2)
+    outward = np.cross(ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0])
+    columns = [ordered.mean(axis=1), np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0, outward]
+    parts = np.ascontiguousarray(np.column_stack(columns))
+    nodes, moments = np.zeros((len(tree.begin), 24)), np.zeros((len(tree.begin), 32))
+    _gather(ordered, areas, parts, tree.second, tree.begin, tree.end, nodes, moments)
+    _enclose(ordered, areas, tree.begin, tree.end, nodes)
     nodes[:, LOWER:UPPER] = tree.lower - nodes[:, CENTROID:RADIUS]
     nodes[:, UPPER:NORMAL] = tree.upper - nodes[:, CENTROID:RADIUS]
-    return Clusters(ordered, areas, nodes, moments)
+    widest = int(np.max((tree.end - tree.begin)[tree.second < 0]))
+    return Clusters(ordered, areas, parts, nodes, widest, moments)
 
 
 @kernel
-def _measure(triangles: Floats, areas: Floats, begin: Ints, end: Ints, nodes: Floats, moments: Floats) -> None:
+def _gather(
+    triangles: Floats,
+    areas: Floats,
+    parts: Floats,
+    second: Ints,
+    begin: Ints,
+    end: Ints,
+    nodes: Floats,
+    moments: Floats,
+) -> None:
+    """Write areas, centroids and moments of all nodes; backwards, so that a node's children come before it."""
+    cubes = np.empty((MAX_DEPTH + 1, DEGREE + 1, DEGREE + 1, DEGREE + 1))
+    waiting = 0
+    for index in range(len(begin) - 1, -1, -1):
+        node = nodes[index]
+        if second[index] < 0:
+            cube = cubes[waiting]
+            cube[:] = 0.0
+            for k in range(begin[index], end[index]):
+                node[AREA] += areas[k]
+            for k in range(begin[index], end[index]):
+                # a body without area still has a place
+                weight = areas[k] / node[AREA] if node[AREA] > 0.0 else 1.0 / (end[index] - begin[index])
+                for axis in range(3):
+                    node[axis] += weight * parts[k, axis]
+            for k in range(begin[index], end[index]):
+                if areas[k] > 0.0:
+                    add_triangle_moments(triangles[k], areas[k], node, cube)
+            waiting += 1
+        else:
+            # the first child came last
+            first, last = nodes[index + 1], nodes[second[index]]
+            node[AREA] = first[AREA] + last[AREA]
+            share = last[AREA] / node[AREA] if node[AREA] > 0.0 else 0.5
+            for axis in range(3):
+                node[axis] = first[axis] + share * (last[axis] - first[axis])
+            cube, other = cubes[waiting - 2], cubes[waiting - 1]
+            move_moments(cube, last[0] - node[0], last[1] - node[1], last[2] - node[2])
+            move_moments(other, first[0] - node[0], first[1] - node[1], first[2] - node[2])
+            add_moments(cube, other)
+            waiting -= 1
+        if node[AREA] > 0.0:
+            _summarise(cube, node, moments[index])
+
+
+@leaf_kernel
+def _summarise(cube: Floats, node: Floats, moments: Floats) -> None:
+    """Write what of a node's moments is kept, as means over its area."""
+    area = node[AREA]
+    for k in range(len(_KEPT)):
+        moments[k] = cube[_KEPT[k, 0], _KEPT[k, 1], _KEPT[k, 2]] / area
+    mean2, mean4, mean6, square5 = 0.0, 0.0, 0.0, 0.0
+    for i in range(4):
+        for j in range(4 - i):
+            k = 3 - i - j
+            # |d|^6 = (x^2 + y^2 + z^2)^3
+            mean6 += _multinomial(i, j, k) * cube[2 * i, 2 * j, 2 * k] / area
+    for i in range(3):
+        for j in range(3 - i):
+            k = 2 - i - j
+            mean4 += _multinomial(i, j, k) * cube[2 * i, 2 * j, 2 * k] / area
+    for i in range(6):
+        for j in range(6 - i):
+            k = 5 - i - j
+            square5 += _multinomial(i, j, k) * (cube[i, j, k] / area) ** 2
+    mean2 = (cube[2, 0, 0] + cube[0, 2, 0] + cube[0, 0, 2]) / area
+    node[MEAN2], node[MEAN6] = mean2, mean6
+    node[MEAN5] = math.sqrt(mean4) * math.sqrt(mean6)  # |d|^5 = |d|^2 |d|^3, by Cauchy and Schwarz
+    node[ODD5] = math.sqrt(square5)
+
+
+@leaf_kernel
+def _multinomial(i: int, j: int, k: int) -> float:
+    result = 1.0
+    for n in range(1, j + 1):
+        result *= (i + n) / n
+    for n in range(1, k + 1):
+        result *= (i + j + n) / n
+    return result
+
+
+@kernel
+def _enclose(triangles: Floats, areas: Floats, begin: Ints, end: Ints, nodes: Floats) -> None:
+    """Write radii, cones of normals and the planes' offsets of all nodes."""
     unit = np.zeros((len(triangles), 3))
     for k in range(len(triangles)):
         _unit_normal(triangles[k], unit[k])
     for index in range(len(begin)):
         node = nodes[index]
-        first, last = begin[index], end[index]
-        for k in range(first, last):
-            node[AREA] += areas[k]
+        for k in range(begin[index], end[index]):
             for axis in range(3):
                 node[NORMAL + axis] += areas[k] * unit[k, axis]
-        area = node[AREA]
-        for k in range(first, last):
-            # a body without area still has a place
-            weight = areas[k] / area if area > 0.0 else 1.0 / (last - first)
-            for axis in range(3):
-                corners = triangles[k, 0, axis] + triangles[k, 1, axis] + triangles[k, 2, axis]
-                node[CENTROID + axis] += weight * corners / 3.0
         length = math.sqrt(node[NORMAL] ** 2 + node[NORMAL + 1] ** 2 + node[NORMAL + 2] ** 2)
-        node[OPENING] = 1.0 if length > 1e-9 * area else -1.0
+        node[OPENING] = 1.0 if length > 1e-9 * node[AREA] else -1.0
         for axis in range(3):
             node[NORMAL + axis] = node[NORMAL + axis] / length if node[OPENING] > 0.0 else 0.0
-        for k in range(first, last):
+        largest, nearest, farthest = 0.0, np.inf, -np.inf
+        for k in range(begin[index], end[index]):
+            cosine, offset = 0.0, 0.0
+            for axis in range(3):
+                cosine += unit[k, axis] * node[NORMAL + axis]
+                offset += unit[k, axis] * (triangles[k, 0, axis] - node[axis])
             if areas[k] > 0.0:
-                _add_triangle(triangles[k], areas[k] / area, node, moments[index])
-                cosine = 0.0
-                for axis in range(3):
-                    cosine += unit[k, axis] * node[NORMAL + axis]
                 node[OPENING] = min(node[OPENING], cosine)
+                nearest, farthest = min(nearest, offset), max(farthest, offset)
             for corner in range(3):
-                square = 0.0
-                for axis in range(3):
-                    square += (triangles[k, corner, axis] - node[CENTROID + axis]) ** 2
-                node[RADIUS] = max(node[RADIUS], math.sqrt(square))
+                x, y, z = (
+                    triangles[k, corner, 0] - node[0],
+                    triangles[k, corner, 1] - node[1],
+                    triangles[k, corner, 2] - node[2],
+                )
+                largest = max(largest, x * x + y * y + z * z)
+        node[RADIUS], node[NEAREST_PLANE], node[FARTHEST_PLANE] = math.sqrt(largest), nearest, farthest
 
 
-@kernel
+@leaf_kernel
 def _unit_normal(triangle: Floats, result: Floats) -> None:
     a, b, c = triangle[0], triangle[1], triangle[2]
     bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -101,25 +202,3 @@ def _unit_normal(triangle: Floats, result: Floats) -> None:
     length = math.sqrt(x * x + y * y + z * z)
     if length > 0.0:
         result[0], result[1], result[2] = x / length, y / length, z / length
-
-
-@kernel
-def _add_triangle(triangle: Floats, weight: float, node: Floats, moments: Floats) -> None:
-    for point in range(7):
-        a, b, c = TRIANGLE_7[0, point], TRIANGLE_7[1, point], TRIANGLE_7[2, point]
-        x = a * triangle[0, 0] + b * triangle[1, 0] + c * triangle[2, 0] - node[CENTROID]
-        y = a * triangle[0, 1] + b * triangle[1, 1] + c * triangle[2, 1] - node[CENTROID + 1]
-        z = a * triangle[0, 2] + b * triangle[1, 2] + c * triangle[2, 2] - node[CENTROID + 2]
-        w = weight * TRIANGLE_7[3, point]
-        d = (x, y, z)
-        pairs = (x * x, y * y, z * z, x * y, x * z, y * z)
-        place = FOURTH
-        for i in range(6):
-            moments[SECOND + i] += w * pairs[i]
-            for axis in range(3):
-                moments[THIRD + 6 * axis + i] += w * d[axis] * pairs[i]
-            for j in range(i, 6):
-                moments[place] += w * pairs[i] * pairs[j]
-                place += 1
-        square = x * x + y * y + z * z
-        node[SPREAD4] += w * square * square

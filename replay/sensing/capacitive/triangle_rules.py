@@ -1,4 +1,4 @@
-"""One triangle at the least cost that its share of the error budget allows; the bounds are derived in `tree_sum`."""
+"""One triangle by point rules, at the least cost that an error allows; the bounds are derived in `tree_sum`."""
 
 from __future__ import annotations
 
@@ -8,237 +8,170 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
-from replay.numerics.jit import kernel
-from replay.sensing.capacitive.contact import CLEAR, contact
-from replay.sensing.capacitive.exact import integral_over_triangle
-from replay.sensing.capacitive.triangle_sum import faces_centre
+from replay.numerics.jit import leaf_kernel
+from replay.sensing.capacitive.cluster_bounds import CLOSEST
 
 Floats = NDArray[np.float64]
 
-_GREED = 8.0
-"""A node may take up to this many times its own share of the budget, if earlier nodes have left it."""
-
-_THRIFT = 0.25
-"""Largest part of what earlier nodes have left that one node may take."""
-
-
-FITS, NEAR, CROSSES_X, CROSSES_Y, CROSSES_Z = range(5)
-"""Verdicts on a point rule: it fits; the triangle is too near; a border in x, in y, or z = 0 must be cut first."""
+POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE, PART_ABOVE = range(6)
+"""What a triangle is summed by: points; or by one point, the part of it that is above z = 0."""
 
 _RULE_3, _RULE_7, _RULE_16 = 0.12, 0.065, 0.005
-"""Error constants of the point rules, twice the worst of 20 000 triangles (slivers too) at h/r = 0.06..0.5 in regions
-of each kind. Rigorous are 1.5, 2 and 2, from the terms of Legendre's expansion at their largest, but no triangle comes
-near: 0.056, 0.031 and 0.002 were the worst."""
+"""Error constants of the point rules: about twice the largest that a search over all shapes (slivers too), directions,
+regions and h/r up to 2/3 climbs to, 0.062, 0.033 and 0.0022 (test_point_rules)."""
 
 RULE_POINTS = 16
 """Most points of a rule."""
 
-PIECES = 16
-"""Most pieces of one triangle: each of five planes replaces a piece by at most three, one after the other."""
 
+@leaf_kernel
+def rule_error(rule: int, area: float, spread: float, h: float, r: float, doubt: float) -> float:
+    """Return the error bound [m] of a rule on a triangle of area [m^2], spread [m^2], radius h [m], r [m] away.
 
-@kernel
-def allowance(share: float, saved: float) -> float:
-    """Return the error [m] that a node with a share of the budget may make, given what earlier nodes have saved."""
-    return max(share, min(_GREED * share, _THRIFT * saved))
-
-
-@kernel
-def triangle_within(
-    corners: Floats,
-    area: float,
-    half_x: float,
-    half_y: float,
-    both: bool,
-    facing: bool,
-    rtol: float,
-    saved: float,
-    scratch: Floats,
-    pieces: Floats,
-    terms: Floats,
-) -> tuple[float, float, float, bool]:
-    """Return the integral over a triangle (3, 3) in the plate's frame, its share, its error bound, if it touches.
-
-    Before the closed form is called for, the triangle is cut by z = 0 and by borders in its way, and point rules are
-    tried on the pieces; `pieces` (PIECES, 4, 3) holds their corners and, last, their areas.
+    `doubt` is what the borders add, see `borders`; one point does not care where it lies.
     """
-    z0, z1, z2 = corners[0, 2], corners[1, 2], corners[2, 2]
-    touches = False
-    if min(z0, z1, z2) <= 0.0 <= max(z0, z1, z2):
-        touches = contact(corners, half_x, half_y, both) != CLEAR
-    if (not both and max(z0, z1, z2) <= 0.0) or (facing and not faces_centre(corners)):
-        return 0.0, 0.0, 0.0, touches
-    total, share, error = 0.0, 0.0, 0.0
-    for k in range(3):
-        for axis in range(3):
-            pieces[0, k, axis] = corners[k, axis]
-    pieces[0, 3, 0] = area
-    size, near = 1, False
-    verdict = CROSSES_Z if not both and min(z0, z1, z2) < 0.0 else FITS
-    if verdict == CROSSES_Z and touches:
-        near = True
-    while size > 0 and not near:
-        if verdict != CROSSES_Z:
-            value, own, e, verdict = _by_points(pieces, size - 1, half_x, half_y, rtol, saved, terms)
-        if verdict == FITS:
-            total, share, error = total + value, share + own, error + e
-            saved += own - e
-            size -= 1
-        elif verdict == NEAR:
-            near = True
-        else:
-            size = _cut(pieces, size, verdict - CROSSES_X, half_x, half_y)
-            verdict = FITS
-    if not near:
-        return total, share, error, touches
-    value = integral_over_triangle(corners, area, half_x, half_y, both, scratch)
-    return value, (rtol * value if value < math.inf else 0.0), 0.0, touches
+    nearest, inverse = 1.0 / (r - h), 1.0 / r
+    if rule == POINTS_1:
+        return area * spread * nearest * nearest * nearest
+    smooth, x = area * spread * nearest * inverse * inverse, h * inverse
+    if rule == POINTS_3:
+        return _RULE_3 * smooth * x + doubt
+    cube = x * x * x
+    if rule == POINTS_7:
+        return _RULE_7 * smooth * cube * x + doubt
+    return _RULE_16 * smooth * cube * cube * x + doubt
 
 
-@kernel
-def _cut(pieces: Floats, size: int, axis: int, half_x: float, half_y: float) -> int:
-    """Replace the last piece by its parts on either side of a border across an axis, or by those above z = 0.
+@leaf_kernel
+def cheapest_rule(
+    first: int, area: float, spread: float, h: float, r: float, doubt: float, allowed: float
+) -> tuple[int, float]:
+    """Return the cheapest rule, from `first` on, whose error is allowed, and that error; or NO_RULE and inf."""
+    for rule in range(first, NO_RULE):
+        error = rule_error(rule, area, spread, h, r, doubt)
+        if error <= allowed:
+            return rule, error
+    return NO_RULE, math.inf
 
-    Returns the new number of pieces.
+
+@leaf_kernel
+def _over_borders(
+    pieces: Floats, index: int, axis: int, centroid: float, half: float, most: float, least: float
+) -> tuple[float, float]:
+    """Return how much larger the mean of 1/dist is than that of the centroid's region [1/m], and how wrong that may be.
+
+    The depth w over a border changes 1/dist by w^2/2 times `least` to `most` [1/m^3]: it becomes less outside, more
+    between the borders. A piece that also reaches over the opposite border gains less than w says.
     """
-    last = size - 1
-    only_beyond = axis == 2
-    border = 0.0 if only_beyond else (half_x if axis == 0 else half_y)
-    low, high = (
-        min(pieces[last, 0, axis], pieces[last, 1, axis], pieces[last, 2, axis]),
-        max(pieces[last, 0, axis], pieces[last, 1, axis], pieces[last, 2, axis]),
+    if abs(centroid) <= half:
+        square = _mean_square(pieces, index, axis, 1.0, half) + _mean_square(pieces, index, axis, -1.0, half)
+        return -0.25 * square * (most + least), 0.25 * square * (most - least)
+    sign = -math.copysign(1.0, centroid)
+    square = _mean_square(pieces, index, axis, sign, -half)
+    if square > 0.0 and _mean_square(pieces, index, axis, sign, half) > 0.0:
+        least = 0.0
+    return 0.25 * square * (most + least), 0.25 * square * (most - least)
+
+
+@leaf_kernel
+def _mean_square(pieces: Floats, index: int, axis: int, sign: float, border: float) -> float:
+    """Return the mean of max(sign x coordinate - border, 0)^2 over a piece."""
+    p, q, s = (
+        sign * pieces[index, 0, axis] - border,
+        sign * pieces[index, 1, axis] - border,
+        sign * pieces[index, 2, axis] - border,
     )
-    if not low < border < high:
-        border = -border
-    beyond_0, beyond_1, beyond_2 = (
-        pieces[last, 0, axis] > border,
-        pieces[last, 1, axis] > border,
-        pieces[last, 2, axis] > border,
-    )
-    alone = 0 if beyond_1 == beyond_2 else (1 if beyond_0 == beyond_2 else 2)
-    area = pieces[last, 3, 0]
-    ax, ay, az = pieces[last, alone, 0], pieces[last, alone, 1], pieces[last, alone, 2]
-    j, k = (alone + 1) % 3, (alone + 2) % 3
-    bx, by, bz = pieces[last, j, 0], pieces[last, j, 1], pieces[last, j, 2]
-    cx, cy, cz = pieces[last, k, 0], pieces[last, k, 1], pieces[last, k, 2]
-    is_beyond = pieces[last, alone, axis] > border
-    gap = pieces[last, alone, axis] - border
-    s, t = (
-        gap / (pieces[last, alone, axis] - pieces[last, j, axis]),
-        gap / (pieces[last, alone, axis] - pieces[last, k, axis]),
-    )
-    p = (ax + s * (bx - ax), ay + s * (by - ay), az + s * (bz - az))
-    q = (ax + t * (cx - ax), ay + t * (cy - ay), az + t * (cz - az))
-    p = (border if axis == 0 else p[0], border if axis == 1 else p[1], border if axis == 2 else p[2])
-    q = (border if axis == 0 else q[0], border if axis == 1 else q[1], border if axis == 2 else q[2])
-    size -= 1
-    for part in range(3):
-        if only_beyond and is_beyond != (part == 0):
-            continue
-        first = (ax, ay, az) if part == 0 else (bx, by, bz)
-        second = p if part == 0 else ((cx, cy, cz) if part == 1 else q)
-        third = p if part == 2 else q
-        for k in range(3):
-            pieces[size, 0, k], pieces[size, 1, k], pieces[size, 2, k] = first[k], second[k], third[k]
-        pieces[size, 3, 0] = area * (s * t if part == 0 else (1.0 - t if part == 1 else t * (1.0 - s)))
-        size += 1
-    return size
+    low, high = min(p, q, s), max(p, q, s)
+    if high <= 0.0:
+        return 0.0
+    middle = max(min(p, q), min(max(p, q), s))
+    if middle <= 0.0:
+        return high * high / 6.0 * (high / (high - middle)) * (high / (high - low))  # type: ignore[no-any-return]
+    square = (p * p + q * q + s * s + (p + q + s) ** 2) / 12.0
+    if low < 0.0:
+        square -= low * low / 6.0 * (low / (low - middle)) * (low / (low - high))
+    return max(square, 0.0)  # type: ignore[no-any-return]
 
 
-@kernel
-def _by_points(
-    pieces: Floats, index: int, half_x: float, half_y: float, rtol: float, saved: float, terms: Floats
-) -> tuple[float, float, float, int]:
-    """Return integral, share, error bound and verdict of the cheapest point rule that fits, if one does."""
-    area = pieces[index, 3, 0]
-    x = (pieces[index, 0, 0] + pieces[index, 1, 0] + pieces[index, 2, 0]) / 3.0
-    y = (pieces[index, 0, 1] + pieces[index, 1, 1] + pieces[index, 2, 1]) / 3.0
-    z = (pieces[index, 0, 2] + pieces[index, 1, 2] + pieces[index, 2, 2]) / 3.0
-    u = x - math.copysign(half_x, x) if abs(x) > half_x else 0.0
-    v = y - math.copysign(half_y, y) if abs(y) > half_y else 0.0
-    r = math.sqrt(u * u + v * v + z * z)
-    squares, largest = 0.0, 0.0
-    for k in range(3):
-        dx, dy, dz = pieces[index, k, 0] - x, pieces[index, k, 1] - y, pieces[index, k, 2] - z
-        square = dx * dx + dy * dy + dz * dz
-        squares += square
-        largest = max(largest, square)
-    if r * r <= 4.0 * largest:
-        return 0.0, 0.0, 0.0, NEAR
-    h, spread = math.sqrt(largest), squares / 12.0
-    share = rtol * area / (r + h)
-    allowed = allowance(share, saved)
-    nearest = 1.0 / (r - h)
-    cube = area * spread * nearest * nearest * nearest
-    if cube <= allowed:
-        return area / r, share, cube, FITS
-    inverse = 1.0 / r
-    ratio = h * inverse
-    smooth = area * spread * nearest * inverse * inverse
-    ratio_3 = ratio * ratio * ratio
-    error_3, error_7 = _RULE_3 * smooth * ratio, _RULE_7 * smooth * ratio_3 * ratio
-    error_16 = _RULE_16 * smooth * ratio_3 * ratio_3 * ratio
-    if error_16 > allowed:
-        return 0.0, 0.0, 0.0, NEAR
-    border = 0.0
-    if abs(abs(x) - half_x) < h or abs(abs(y) - half_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
-        border_x = 0.5 * area * _border(pieces, index, 0, x, half_x) * nearest * nearest * nearest
-        border_y = 0.5 * area * _border(pieces, index, 1, y, half_y) * nearest * nearest * nearest
-        border = border_x + border_y
-        if border + error_16 > allowed:
-            return 0.0, 0.0, 0.0, (CROSSES_X if border_x >= border_y else CROSSES_Y)
-    keep_x, keep_y = 0.0 if u == 0.0 else 1.0, 0.0 if v == 0.0 else 1.0
-    total = 0.0
-    if border + error_3 <= allowed:
-        for k in range(3):
-            px = u + keep_x * 0.5 * (pieces[index, k, 0] - x)
-            py = v + keep_y * 0.5 * (pieces[index, k, 1] - y)
-            pz = z + 0.5 * (pieces[index, k, 2] - z)
-            total += 1.0 / math.sqrt(px * px + py * py + pz * pz)
-        return area * total / 3.0, share, border + error_3, FITS
-    fits_7 = border + error_7 <= allowed
-    if fits_7:
-        total = _points(TRIANGLE_7, pieces, index, u - x * keep_x, v - y * keep_y, keep_x, keep_y, terms)
-        return area * total, share, border + error_7, FITS
-    total = _points(TRIANGLE_16, pieces, index, u - x * keep_x, v - y * keep_y, keep_x, keep_y, terms)
-    return area * total, share, border + error_16, FITS
-
-
-@kernel
-def _points(
-    rule: Floats,
+@leaf_kernel
+def mean_by_rule(
+    rule: int,
     pieces: Floats,
     index: int,
-    shift_x: float,
-    shift_y: float,
-    keep_x: float,
-    keep_y: float,
+    x: float,
+    y: float,
+    half_x: float,
+    half_y: float,
     terms: Floats,
 ) -> float:
-    """Return the mean of 1/dist by a symmetric rule; the first loop has no sum in it, so that it is vectorised."""
+    """Return the mean of 1/dist over a piece by a rule of 3 to 16 points, in the region of its centroid (x, y)."""
+    keep_x, keep_y = 1.0 if abs(x) > half_x else 0.0, 1.0 if abs(y) > half_y else 0.0
+    shift_x, shift_y = -keep_x * math.copysign(half_x, x), -keep_y * math.copysign(half_y, y)
     ax, ay, az = keep_x * pieces[index, 0, 0] + shift_x, keep_y * pieces[index, 0, 1] + shift_y, pieces[index, 0, 2]
     bx, by, bz = keep_x * pieces[index, 1, 0] + shift_x, keep_y * pieces[index, 1, 1] + shift_y, pieces[index, 1, 2]
     cx, cy, cz = keep_x * pieces[index, 2, 0] + shift_x, keep_y * pieces[index, 2, 1] + shift_y, pieces[index, 2, 2]
-    for k in range(rule.shape[1]):
-        a, b, c = rule[0, k], rule[1, k], rule[2, k]
+    if rule == POINTS_3:
+        mx, my, mz = (ax + bx + cx) / 6.0, (ay + by + cy) / 6.0, (az + bz + cz) / 6.0
+        ax, ay, az = mx + 0.5 * ax, my + 0.5 * ay, mz + 0.5 * az
+        bx, by, bz = mx + 0.5 * bx, my + 0.5 * by, mz + 0.5 * bz
+        cx, cy, cz = mx + 0.5 * cx, my + 0.5 * cy, mz + 0.5 * cz
+        total = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
+        total += 1.0 / math.sqrt(bx * bx + by * by + bz * bz)
+        return (total + 1.0 / math.sqrt(cx * cx + cy * cy + cz * cz)) / 3.0
+    points = TRIANGLE_7 if rule == POINTS_7 else TRIANGLE_16
+    # no sum in the first loop, so that it is vectorised
+    for k in range(points.shape[1]):
+        a, b, c = points[0, k], points[1, k], points[2, k]
         px, py, pz = a * ax + b * bx + c * cx, a * ay + b * by + c * cy, a * az + b * bz + c * cz
-        terms[k] = rule[3, k] / math.sqrt(px * px + py * py + pz * pz)
+        terms[k] = points[3, k] / math.sqrt(px * px + py * py + pz * pz)
     total = 0.0
-    for k in range(rule.shape[1]):
+    for k in range(points.shape[1]):
         total += terms[k]
     return total
 
 
-@kernel
-def _border(pieces: Floats, index: int, axis: int, centroid: float, half: float) -> float:
-    """Return a bound of mean(w^2) [m^2], w the depth by which a triangle lies outside its centroid's slab."""
-    over, variance = 0.0, 0.0
-    for k in range(3):
-        offset = pieces[index, k, axis] - centroid
-        variance += offset * offset / 12.0
-        if abs(centroid) > half:
-            over = max(over, half - math.copysign(1.0, centroid) * pieces[index, k, axis])
-        else:
-            over = max(over, abs(pieces[index, k, axis]) - half)
-    gap = abs(abs(centroid) - half)
-    return min(over * over, variance * (over / (over + gap)) ** 2) if over > 0.0 else 0.0
+@leaf_kernel
+def borders(
+    pieces: Floats, index: int, area: float, x: float, y: float, h: float, r: float, half_x: float, half_y: float
+) -> tuple[float, float, float]:
+    """Return what the borders do to a piece [m]: the correction, its error, and the part of it that x makes."""
+    near_x = abs(abs(x) - half_x) < h or abs(x) + half_x < h
+    near_y = abs(abs(y) - half_y) < h or abs(y) + half_y < h
+    if not (near_x or near_y):
+        return 0.0, 0.0, 0.0
+    nearest, farthest = 1.0 / (r - h), 1.0 / (r + h)
+    most, least = nearest * nearest * nearest, farthest * farthest * farthest
+    shift_x, doubt_x = _over_borders(pieces, index, 0, x, half_x, most, least) if near_x else (0.0, 0.0)
+    shift_y, doubt_y = _over_borders(pieces, index, 1, y, half_y, most, least) if near_y else (0.0, 0.0)
+    return area * (shift_x + shift_y), area * (doubt_x + doubt_y), area * doubt_x
+
+
+@leaf_kernel
+def part_above(
+    pieces: Floats, area: float, spread: float, h: float, half_x: float, half_y: float
+) -> tuple[float, float]:
+    """Return the integral over the part above z = 0 of a triangle that crosses it, by one point, and its bound [m].
+
+    About its own centroid the part's integral of |d|^2 is less than that of the triangle about the triangle's.
+    """
+    above_0, above_1, above_2 = pieces[0, 0, 2] > 0.0, pieces[0, 1, 2] > 0.0, pieces[0, 2, 2] > 0.0
+    alone = 0 if above_1 == above_2 else (1 if above_0 == above_2 else 2)
+    j, k = (alone + 1) % 3, (alone + 2) % 3
+    ax, ay, az = pieces[0, alone, 0], pieces[0, alone, 1], pieces[0, alone, 2]
+    bx, by, bz = pieces[0, j, 0] - ax, pieces[0, j, 1] - ay, pieces[0, j, 2] - az
+    cx, cy, cz = pieces[0, k, 0] - ax, pieces[0, k, 1] - ay, pieces[0, k, 2] - az
+    s, t = -az / bz, -az / cz
+    part = s * t
+    x, y, z = ax + (s * bx + t * cx) / 3.0, ay + (s * by + t * cy) / 3.0, az + (s * bz + t * cz) / 3.0
+    if az < 0.0:
+        rest = 1.0 - part
+        x = (ax + (bx + cx) / 3.0 - part * x) / rest
+        y = (ay + (by + cy) / 3.0 - part * y) / rest
+        z = (az + (bz + cz) / 3.0 - part * z) / rest
+        part = rest
+    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+    r = math.sqrt(u * u + v * v + z * z)
+    if r <= 2.0 * CLOSEST * h:
+        return 0.0, math.inf
+    nearest = 1.0 / (r - 2.0 * h)
+    return area * part / r, area * spread * nearest * nearest * nearest

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.geometry.wide_tree import LANES, MAX_WAITING, WideTree
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import Cone
 from replay.sensing.distance.query import COMPUTED, LOOKED_AT, REPEATED, closest_in_tree, closest_of_all
@@ -37,7 +37,7 @@ def axis_of(pose: Array) -> tuple[float, float, float]:
 @kernel
 def sweep_exact(
     triangles: Array,
-    tree: Tree,
+    tree: WideTree,
     T_target_sensor: Array,
     cos_half: float,
     sin_half: float,
@@ -60,7 +60,7 @@ def sweep_exact(
         nearest: best candidates of the targets before.
         counts: (COUNTS,) added to, see `query`.
     """
-    stack, bounds = np.empty(MAX_DEPTH, dtype=np.int64), np.empty(MAX_DEPTH)
+    stack, waiting, bounds = np.empty(MAX_WAITING, dtype=np.int64), np.empty(MAX_WAITING), np.empty(LANES)
     distance, offset, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
     searched_to, start = -1.0, -1
     for i in range(len(T_target_sensor)):
@@ -74,7 +74,7 @@ def sweep_exact(
             cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
             apex = (pose[0, 3], pose[1, 3], pose[2, 3])
             distance, offset, triangle, case = closest_in_tree(
-                triangles, tree, apex, cone, limit, start, stack, bounds, counts
+                triangles, tree, apex, cone, limit, start, stack, waiting, bounds, counts
             )
             searched_to = limit
             if triangle >= 0:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.tree import triangle_tree
+from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.sensing.columns import DistanceColumns
@@ -145,6 +146,7 @@ class DistanceSuite:
 
     def _sweeper(self, engine: str) -> Sweep:
         if self.method == "exact":
+            self._wide = [widen(target.tree, target.triangles) for target in self.targets]
             return self._exact
         if self.method == "thesis":
             return self._thesis
@@ -170,7 +172,7 @@ class DistanceSuite:
         cos_half, sin_half = half_angle(sensor.aperture)
         cone, counts = (cos_half, sin_half, sensor.range), np.zeros(COUNTS, dtype=np.int64)
         if self._savings:
-            sweep_exact(target.triangles, target.tree, pose, *cone, index, nearest, counts)
+            sweep_exact(target.triangles, self._wide[index], pose, *cone, index, nearest, counts)
         else:
             sweep_scan(target.triangles, pose, *cone, index, nearest, counts)
         self.counters.add(counts.tolist())

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from replay.geometry.tree import MAX_DEPTH, triangle_tree
+from replay.geometry.tree import triangle_tree
+from replay.geometry.wide_tree import LANES, MAX_WAITING, widen
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import Cone, half_angle
 from replay.sensing.distance.query import COUNTS, closest_in_tree, closest_of_all
@@ -14,14 +15,14 @@ from tests.sensing.distance.meshes import grid_of_cubes, torus
 
 @kernel
 def all_answers(triangles, tree, apexes, axes, half_angles, reaches, starts, walk):
-    stack, bounds = np.empty(MAX_DEPTH, dtype=np.int64), np.empty(MAX_DEPTH)
+    stack, waiting, bounds = np.empty(MAX_WAITING, dtype=np.int64), np.empty(MAX_WAITING), np.empty(LANES)
     answers, counts = np.empty((len(apexes), 6)), np.zeros(COUNTS, dtype=np.int64)
     for i in range(len(apexes)):
         cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1])
         apex = (apexes[i, 0], apexes[i, 1], apexes[i, 2])
         if walk:
             distance, x, triangle, case = closest_in_tree(
-                triangles, tree, apex, cone, reaches[i], starts[i], stack, bounds, counts
+                triangles, tree, apex, cone, reaches[i], starts[i], stack, waiting, bounds, counts
             )
         else:
             distance, x, triangle, case = closest_of_all(triangles, apex, cone, reaches[i])
@@ -44,7 +45,11 @@ MESHES = {
     "cubes": lambda rng: grid_of_cubes(4),
     "soup": soup,
     "far": lambda rng: torus(20, 12) * 0.1 + [1e6, -2e5, 3e5],
+    "fine": lambda rng: torus(120, 50),
     "one": lambda rng: rng.normal(size=(1, 3, 3)),
+    "two": lambda rng: rng.normal(size=(2, 3, 3)),
+    "a leaf": lambda rng: rng.normal(size=(LANES, 3, 3)),
+    "a leaf and one": lambda rng: rng.normal(size=(LANES + 1, 3, 3)),
 }
 
 
@@ -52,7 +57,7 @@ MESHES = {
 def test_walk_equals_scan_bit_for_bit(name):
     rng = np.random.default_rng(20152)
     triangles = np.ascontiguousarray(MESHES[name](rng))
-    tree = triangle_tree(triangles)
+    tree = widen(triangle_tree(triangles), triangles)
     n = 400
     centre, size = triangles.mean(axis=(0, 1)), np.ptp(triangles, axis=(0, 1)).max()
     apexes = centre + size * rng.normal(size=(n, 3))

@@ -1,0 +1,48 @@
+"""Vectors as triples of numbers, which kernels pass in registers."""
+
+from __future__ import annotations
+
+import math
+
+from replay.numerics.jit import kernel
+
+Triple = tuple[float, float, float]
+
+UNDERFLOW = 1e-280
+"""Below it a square has lost digits, or all of them."""
+
+
+@kernel
+def minus(a: Triple, b: Triple) -> Triple:
+    """Return a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@kernel
+def along(a: Triple, factor: float, b: Triple) -> Triple:
+    """Return a + factor b."""
+    return (a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2])
+
+
+@kernel
+def dot(a: Triple, b: Triple) -> float:
+    """Return the scalar product of a and b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a: Triple, b: Triple) -> Triple:
+    """Return the vector product of a and b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def norm(a: Triple) -> float:
+    """Return the length of a, without underflow."""
+    square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    if square < UNDERFLOW:
+        largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
+        if largest > 0.0:
+            x, y, z = a[0] / largest, a[1] / largest, a[2] / largest
+            return largest * math.sqrt(x * x + y * y + z * z)
+    return math.sqrt(square)

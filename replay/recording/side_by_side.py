@@ -1,0 +1,117 @@
+"""Several rerun recordings in one, each below its own name, so that one viewer shows them beside each other."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from replay.errors import ViewerError
+from replay.recording import blueprint
+from replay.recording.rerun_file import RerunFile
+from replay.recording.scene_view import Floats
+
+_CHARTS = (blueprint.DISTANCE, blueprint.CAPACITIVE, blueprint.CLEARANCE, blueprint.JOINTS)
+_EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
+
+
+def side_names(files: Sequence[Path]) -> list[str]:
+    """Return a name for each file: that of the file, or of the folder in which paths that end alike differ."""
+    names = [file.stem for file in files]
+    parts = [file.absolute().parts for file in files]
+    for places in zip(*parts, strict=False):
+        if len(set(names)) == len(names):
+            break
+        if len(set(places)) == len(places):
+            names = list(places)
+    return names if len(set(names)) == len(names) else [f"{k + 1} {name}" for k, name in enumerate(names)]
+
+
+@contextlib.contextmanager
+def one_recording(files: Sequence[Path]) -> Iterator[Path]:
+    """Give the file itself when it is one, else one that shows all of them and is gone afterwards."""
+    if len(files) == 1:
+        yield files[0]
+        return
+    with tempfile.TemporaryDirectory(prefix="replay-") as folder:
+        target = Path(folder) / "side_by_side.rrd"
+        write_side_by_side(files, target)
+        yield target
+
+
+def write_side_by_side(files: Sequence[Path], target: Path) -> None:
+    """Write one recording that shows several.
+
+    Args:
+        files: `.rrd` files.
+        target: the one to write.
+
+    Raises:
+        ViewerError: a file cannot be read.
+        WriteError: the file cannot be written.
+    """
+    from rerun.chunk import RrdReader
+
+    sides = side_names(files)
+    result = RerunFile(target, overwrite=True)
+    try:
+        stream = result.open("replay: side by side")
+        stream.send_recording_name(" | ".join(sides))
+        found = _Found()
+        for side, file in zip(sides, files, strict=True):
+            try:
+                reader = RrdReader(str(file))
+                found.look_from(reader)
+                for chunk in reader.stream():
+                    _copy(stream, chunk, side, found)
+            except (RuntimeError, ValueError) as error:
+                raise ViewerError(f"{file}: cannot be read: {error}") from None
+        stream.send_blueprint(
+            blueprint.side_by_side(sides, sorted(found.charts), found.eye, found.target, found.end), make_active=False
+        )
+        result.commit()
+    except BaseException:
+        result.discard()
+        raise
+
+
+class _Found:
+    """What the recordings have: charts, their end [ns], and from where the first one looks at its scene."""
+
+    def __init__(self) -> None:
+        self.charts: set[str] = set()
+        self.end = 0
+        self.eye: Floats = np.array([3.0, -4.0, 3.0])
+        self.target: Floats = np.zeros(3)
+        self._looked = False
+
+    def look_from(self, reader: Any) -> None:
+        """Take the first recording's eye, so that all scenes are seen from one place."""
+        for store in () if self._looked else reader.blueprints():
+            for chunk in reader.stream(store=store):
+                names = chunk.to_record_batch().schema.names
+                if all(name in names for name in _EYE):
+                    batch = chunk.to_record_batch()
+                    eye, target = (batch.column(name).to_pylist()[-1][0] for name in _EYE)
+                    self.eye, self.target, self._looked = np.array(eye), np.array(target), True
+
+
+def _copy(stream: Any, chunk: Any, side: str, found: _Found) -> None:
+    """Send a chunk below the name of its side."""
+    import rerun as rr
+
+    path = str(chunk.entity_path)
+    if path.startswith("/__"):  # properties of the recording itself
+        return
+    batch = chunk.to_record_batch()
+    stream.send_chunks(chunk.with_entity_path(f"{rr.new_entity_path([side])}{path}"))
+    top = path.split("/")[1]
+    if top in _CHARTS:
+        found.charts.add(top)
+    if blueprint.TIMELINE in chunk.timeline_names and len(batch):
+        times = batch.column(blueprint.TIMELINE).cast("int64").to_numpy(zero_copy_only=False)
+        found.end = max(found.end, int(times.max()))

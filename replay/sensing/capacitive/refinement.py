@@ -1,0 +1,86 @@
+"""The parts of a sum by their error per effort, worst first: a queue of buckets, half an octave each.
+
+Parts live in slots. A slot's row of `values` holds what was found of its part (see `cluster_bounds`), its row of
+`labels` what it is. The last that came into a bucket leaves it first, so that results repeat.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics.jit import leaf_kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PART, RULE, NEXT = range(3)
+"""Columns of `labels`: index of the node or triangle; a triangle's rule, CLUSTER or FREE; the next slot."""
+
+CLUSTER, FREE = -1, -2
+
+_NONE = -1
+_USED, _HIGHEST, _UNUSED = range(3)
+VALUES, LABELS, BUCKETS = 7, 3, 256
+_BUCKET_OF_ONE = 240
+_SHIFT = 51
+"""A positive double shifted right by so many bits is its exponent and the first bit of its fraction."""
+
+_ONE = int(np.float64(1.0).view(np.int64)) >> _SHIFT
+
+
+class Queue(NamedTuple):
+    """Room for the parts of one sum."""
+
+    values: Floats  # (capacity, 7)
+    labels: Ints  # (capacity, 3)
+    heads: Ints  # (256,) first slot of each bucket, or -1
+    state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
+
+
+@leaf_kernel
+def empty(queue: Queue) -> None:
+    """Take out all parts."""
+    queue.heads[:] = _NONE
+    queue.state[_USED], queue.state[_HIGHEST], queue.state[_UNUSED] = 0, 0, _NONE
+
+
+@leaf_kernel
+def slots_used(queue: Queue) -> int:
+    """Return how many slots there are to look through for parts; FREE ones hold none."""
+    return queue.state[_USED]  # type: ignore[no-any-return]
+
+
+@leaf_kernel
+def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> None:
+    """Add a part; urgency >= 0 is its error per effort, of the order of 1 at most."""
+    slot = queue.state[_UNUSED]
+    if slot == _NONE:
+        slot = queue.state[_USED]
+        queue.state[_USED] = slot + 1
+    else:
+        queue.state[_UNUSED] = queue.labels[slot, NEXT]
+    halves = int(np.float64(urgency).view(np.int64)) >> _SHIFT
+    bucket = min(max(_BUCKET_OF_ONE + halves - _ONE, 0), BUCKETS - 1)
+    queue.labels[slot, PART], queue.labels[slot, RULE], queue.labels[slot, NEXT] = part, rule, queue.heads[bucket]
+    queue.heads[bucket] = slot
+    queue.state[_HIGHEST] = max(queue.state[_HIGHEST], bucket)
+    for k in range(VALUES):
+        queue.values[slot, k] = found[k]
+
+
+@leaf_kernel
+def pop(queue: Queue) -> int:
+    """Take out a part of the highest bucket; return its slot, which is overwritten by the next push, or -1."""
+    bucket = queue.state[_HIGHEST]
+    while bucket > 0 and queue.heads[bucket] == _NONE:
+        bucket -= 1
+    queue.state[_HIGHEST] = bucket
+    slot = queue.heads[bucket]
+    if slot != _NONE:
+        queue.heads[bucket] = queue.labels[slot, NEXT]
+        queue.labels[slot, NEXT] = queue.state[_UNUSED]
+        queue.state[_UNUSED] = slot
+    return slot  # type: ignore[no-any-return]
