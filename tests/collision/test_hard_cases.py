@@ -174,7 +174,7 @@ def run_sheets(n, seed):
         sheets = [np.pad(rng.integers(-3, 4, (rng.integers(3, 8), 2)), ((0, 0), (0, 1))) @ tilt.T for _ in range(2)]
         found = distance(*sheets)
         assert found.status is intersect(*sheets).status is not Status.UNDECIDED
-        assert found.distance == distance(*sheets[::-1]).distance
+        assert found.distance == pytest.approx(distance(*sheets[::-1]).distance, rel=1e-12, abs=2.0**-70 * 50.0)
 
 
 def test_sheets_in_one_plane_are_decided():
