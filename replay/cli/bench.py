@@ -36,13 +36,13 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
     """
     from replay.bench import results
 
-    reports = []
+    reports, paths = [], []
     for name in names or BENCHMARKS:
         begin = time.perf_counter()
         reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
+        paths = results.write(reports, output)  # after each, so that an interruption loses none
         note(f"bench {name}: {time.perf_counter() - begin:.0f} s")
-    for path in results.write(reports, output):
-        note(f"wrote {path}")
+    note(f"wrote {', '.join(map(str, paths))}")
     say(form, lambda: results.as_text(reports), lambda: results.as_json(reports))
     missed = any(goal.failed for report in reports for goal in report.goals)
     return ExitCode.DIFFERENT if missed else ExitCode.FINE
