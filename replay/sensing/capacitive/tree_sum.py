@@ -58,6 +58,7 @@ from replay.sensing.capacitive.refinement import (
     push,
     slots_used,
 )
+from replay.sensing.capacitive.saturation import saturates
 from replay.sensing.capacitive.triangle_bounds import judge_triangle
 from replay.sensing.capacitive.triangle_cuts import PIECES, triangle_within
 from replay.sensing.capacitive.triangle_rules import POINTS_1, RULE_POINTS
@@ -166,6 +167,8 @@ def _sum_one(
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
         -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
     )
+    if saturates(clusters, tree, T, half_x, half_y, both, facing, stack, corners):
+        return math.inf, True, 0.0
     empty(queue)
     ceiling = rtol * _least_of_root(nodes, T, half_x, half_y)
     scale = 1.0 / ceiling if ceiling > 0.0 else 1.0
