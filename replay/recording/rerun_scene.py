@@ -59,13 +59,16 @@ def _log_plates(stream: Any, scene: SceneView) -> None:
     corners = [plate_corners(plate) for plate in scene.plates]
     meshes = indexed([four[[[0, 1, 2], [0, 2, 3]]] for four in corners])
     normals = corner_normals(meshes).reshape(-1, 2, 3, 3)
+    outlines: dict[tuple[str, ...], list[Floats]] = {}
     for plate, four, triangles, across in zip(
         scene.plates, corners, meshes.triangles.reshape(-1, 2, 3, 3), normals, strict=True
     ):
         path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
         _log_mesh(stream, path, triangles, across, PLATE)
-        outline = rr.LineStrips3D([four[[0, 1, 2, 3, 0]]], colors=PLATE, radii=rr.Radius.ui_points(1.0))
-        stream.log([*path, "outline"], outline, static=True)
+        outlines.setdefault((*path[:-1], "outline"), []).append(four[[0, 1, 2, 3, 0]])
+    for place, strips in outlines.items():
+        lines = rr.LineStrips3D(strips, colors=PLATE, radii=rr.Radius.ui_points(1.0))
+        stream.log(list(place), lines, static=True)
 
 
 def log_curve(stream: Any, path: Path, name: str, number: int) -> None:
