@@ -58,6 +58,7 @@ from replay.sensing.capacitive.refinement import (
     push,
     slots_used,
 )
+from replay.sensing.capacitive.saturation import saturates
 from replay.sensing.capacitive.triangle_bounds import judge_triangle
 from replay.sensing.capacitive.triangle_cuts import PIECES, triangle_within
 from replay.sensing.capacitive.triangle_rules import POINTS_1, RULE_POINTS
@@ -166,6 +167,8 @@ def _sum_one(
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
         -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
     )
+    if saturates(clusters, tree, T, half_x, half_y, both, facing, stack, corners):
+        return math.inf, True, 0.0
     empty(queue)
     ceiling = rtol * _least_of_root(nodes, T, half_x, half_y)
     scale = 1.0 / ceiling if ceiling > 0.0 else 1.0
@@ -174,6 +177,7 @@ def _sum_one(
     size, count = 1, 0
     first, limit = POINTS_1, ceiling / _FIRST_PARTS
     allowed = limit
+    judged, whole, in_whole, alone = 0, 0, 0, 0
     touching = False
     total, lost, least, doubt, spent = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
@@ -181,7 +185,7 @@ def _sum_one(
             size -= 1
             task = stack[size]
             if task < first_triangle:
-                counts[NODES] += 1
+                judged += 1
                 verdict = judge_cluster(nodes, moments, task, T, half_x, half_y, both, facing, centre, found)
                 inner = tree.second[task] >= 0
                 if verdict == OPEN or (verdict == KEEP and found[ERROR] > limit):
@@ -222,7 +226,7 @@ def _sum_one(
             continue
         if count > 0:
             count -= 1
-            counts[ALONE] += 1
+            alone += 1
             k = hard[count]
             into_plate(T, triangles, k, corners)
             low = min(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
@@ -236,6 +240,7 @@ def _sum_one(
                 corners, areas[k], half_x, half_y, both, share, room.whole, room.scratch, room.terms
             )
             if value == math.inf:
+                _add_counts(counts, judged, 0, 0, alone)
                 return math.inf, True, 0.0
             total, e = two_sum(total, value)
             lost += e
@@ -270,12 +275,21 @@ def _sum_one(
     for slot in range(slots_used(queue)):
         rule, part = queue.labels[slot, RULE], queue.labels[slot, PART]
         if rule == CLUSTER:
-            counts[CLUSTERS] += 1
-            counts[IN_CLUSTERS] += tree.end[part] - tree.begin[part]
+            whole += 1
+            in_whole += tree.end[part] - tree.begin[part]
         elif rule != FREE:
-            counts[ALONE] += 1
+            alone += 1
+    _add_counts(counts, judged, whole, in_whole, alone)
     total, lost = sum_of_parts(clusters, queue, T, half_x, half_y, total, lost, corners, room.terms)
     return total + lost, touching, doubt + spent
+
+
+@leaf_kernel
+def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
+    counts[NODES] += nodes
+    counts[CLUSTERS] += clusters
+    counts[IN_CLUSTERS] += in_clusters
+    counts[ALONE] += alone
 
 
 @leaf_kernel
