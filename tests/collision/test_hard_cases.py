@@ -127,6 +127,65 @@ def _sliver(rng):
     return reference.box(lengths) if rng.random() < 0.6 else rng.normal(size=(rng.integers(3, 7), 3)) * lengths
 
 
+def run_flat_contacts(n, seed):
+    """Put boxes, some needles, on each other's faces, parallel to 1e-15..1e-3 rad; a contact's point is in both."""
+    rng = np.random.default_rng(seed)
+    met = 0
+    for _ in range(n):
+        sizes = 10.0 ** rng.uniform(-6 if rng.random() < 0.5 else -1, 0, (2, 3))
+        axis, angle = rng.normal(size=3), 10.0 ** rng.uniform(-15, -3)
+        x, y, z = axis / np.sqrt((axis**2).sum())
+        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        turn = motions.rotation(rng)
+        off = rng.uniform(-0.5, 0.5, 3) * sizes.sum(axis=0)
+        side = rng.integers(3)
+        off[side] = 0.5 * sizes[:, side].sum() * (1 - rng.choice([0, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9]))
+        pose_a = motions.pose(turn, rng.normal(size=3))
+        nearly = turn @ (np.identity(3) + np.sin(angle) * skew + 2 * np.sin(angle / 2) ** 2 * skew @ skew)
+        pose_b = motions.pose(nearly, pose_a[:3, 3] + turn @ off)
+        boxes = [reference.box(size) for size in sizes]
+        separation = distance(*boxes, pose_a=pose_a, pose_b=pose_b)
+        verdict = intersect(*boxes, pose_a=pose_a, pose_b=pose_b)
+        assert separation.status is verdict.status is not Status.UNDECIDED
+        if verdict.status is Status.CONTACT:
+            scene = sizes.max() + np.abs(off).max() + np.abs(pose_a[:3, 3]).max()
+            for point in (separation.point_a, verdict.point):
+                for size, pose in zip(sizes, (pose_a, pose_b), strict=True):
+                    inside = pose[:3, :3].T @ (point - pose[:3, 3])
+                    assert (np.abs(inside) <= 0.5 * size + 2e-13 * scene).all()
+        met += verdict.status is Status.CONTACT
+    assert 0.3 < met / n < 0.9
+
+
+def test_points_of_flat_contacts_are_in_both_bodies():
+    run_flat_contacts(1_500, seed=4)
+
+
+@pytest.mark.soak
+def test_points_of_many_flat_contacts_are_in_both_bodies():
+    run_flat_contacts(200_000, seed=5)
+
+
+def run_sheets(n, seed):
+    """Ask about flat polygons in one plane but for the rounding of their corners: nothing stays undecided."""
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        tilt = rng.integers(-3, 4, (3, 3)) / rng.integers(1, 8)
+        sheets = [np.pad(rng.integers(-3, 4, (rng.integers(3, 8), 2)), ((0, 0), (0, 1))) @ tilt.T for _ in range(2)]
+        found = distance(*sheets)
+        assert found.status is intersect(*sheets).status is not Status.UNDECIDED
+        assert found.distance == distance(*sheets[::-1]).distance
+
+
+def test_sheets_in_one_plane_are_decided():
+    run_sheets(1_500, seed=6)
+
+
+@pytest.mark.soak
+def test_many_sheets_in_one_plane_are_decided():
+    run_sheets(200_000, seed=7)
+
+
 def test_slivers_near_contact():
     run_slivers(400, seed=1)
 

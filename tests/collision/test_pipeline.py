@@ -62,7 +62,7 @@ SOLIDS = (
     arc(0.6, 2.0, 0.1, 0.1, 0.03),
     concave(),
     plane((0.5, 0.3)),
-    sphere(0.2, 0.002),  # enough vertices to be climbed
+    sphere(0.2, 0.002),  # enough vertices for a table
 )
 
 

@@ -54,8 +54,8 @@ class CapacitiveSuite:
     Raises:
         InvalidValue: an option is not as stated.
 
-    Accuracy: "tree" stays within rtol, by a bound (test_capacitive_tree); on a phantom of 26 756
-            triangles, at 1 424 poses and rtol 1e-2 to 1e-9, within 0.51 rtol (test_phantom_tolerance).
+    Accuracy: "tree" stays within rtol, by a bound (test_capacitive_tree); on a phantom of 26 756 triangles, at 1 424
+        poses and rtol 1e-2 to 1e-9, within 0.52 rtol (test_phantom_tolerance).
     """
 
     def __init__(
@@ -161,9 +161,8 @@ class CapacitiveSuite:
 def _power_of_two(triangles: Floats) -> float:
     """Return the power of two that brings a body to the size of 1, where products of lengths keep their digits."""
     size = float(np.max(np.abs(triangles), initial=0.0))
-    return (
-        1.0 if size == 0.0 else math.ldexp(1.0, max(-_LARGEST_EXPONENT, min(-math.frexp(size)[1], _LARGEST_EXPONENT)))
-    )
+    exponent = -math.frexp(size)[1] if size > 0.0 else 0
+    return math.ldexp(1.0, max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT)))
 
 
 def _distinct_poses(T: Floats) -> tuple[Floats, NDArray[np.intp]]:
