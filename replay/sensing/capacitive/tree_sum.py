@@ -174,6 +174,7 @@ def _sum_one(
     size, count = 1, 0
     first, limit = POINTS_1, ceiling / _FIRST_PARTS
     allowed = limit
+    judged, whole, in_whole, alone = 0, 0, 0, 0
     touching = False
     total, lost, least, doubt, spent = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
@@ -181,7 +182,7 @@ def _sum_one(
             size -= 1
             task = stack[size]
             if task < first_triangle:
-                counts[NODES] += 1
+                judged += 1
                 verdict = judge_cluster(nodes, moments, task, T, half_x, half_y, both, facing, centre, found)
                 inner = tree.second[task] >= 0
                 if verdict == OPEN or (verdict == KEEP and found[ERROR] > limit):
@@ -222,7 +223,7 @@ def _sum_one(
             continue
         if count > 0:
             count -= 1
-            counts[ALONE] += 1
+            alone += 1
             k = hard[count]
             into_plate(T, triangles, k, corners)
             low = min(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
@@ -236,6 +237,7 @@ def _sum_one(
                 corners, areas[k], half_x, half_y, both, share, room.whole, room.scratch, room.terms
             )
             if value == math.inf:
+                _add_counts(counts, judged, 0, 0, alone)
                 return math.inf, True, 0.0
             total, e = two_sum(total, value)
             lost += e
@@ -270,12 +272,21 @@ def _sum_one(
     for slot in range(slots_used(queue)):
         rule, part = queue.labels[slot, RULE], queue.labels[slot, PART]
         if rule == CLUSTER:
-            counts[CLUSTERS] += 1
-            counts[IN_CLUSTERS] += tree.end[part] - tree.begin[part]
+            whole += 1
+            in_whole += tree.end[part] - tree.begin[part]
         elif rule != FREE:
-            counts[ALONE] += 1
+            alone += 1
+    _add_counts(counts, judged, whole, in_whole, alone)
     total, lost = sum_of_parts(clusters, queue, T, half_x, half_y, total, lost, corners, room.terms)
     return total + lost, touching, doubt + spent
+
+
+@leaf_kernel
+def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
+    counts[NODES] += nodes
+    counts[CLUSTERS] += clusters
+    counts[IN_CLUSTERS] += in_clusters
+    counts[ALONE] += alone
 
 
 @leaf_kernel
