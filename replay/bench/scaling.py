@@ -62,7 +62,9 @@ def run(*, quick: bool = False, rounds: int | None = None, scene: Scenario | Non
     broad_phase.growth(report, most=1000 if quick else 10_000, rounds=rounds)
     _triangles(report, TRIANGLES[: 3 if quick else None], rounds)
     _sensors(report, SENSORS[: 3 if quick else None], rounds)
-    report.grids["workers: scenarios of equal length, process start included"] = workers(cases, 500 if quick else 4000)
+    report.grids["workers: scenarios of equal length, process start included"] = workers(
+        cases, 500 if quick else 12_000
+    )
     return report
 
 
