@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import kernel, leaf_kernel
 
 Pair = tuple[float, float]
 Vector = tuple[Pair, Pair, Pair]
@@ -21,7 +21,7 @@ Vector = tuple[Pair, Pair, Pair]
 _SPLITTER = 134217729.0  # 2^27 + 1
 
 
-@kernel
+@leaf_kernel
 def two_sum(a: float, b: float) -> Pair:
     """Return a + b exactly, as a pair."""
     s = a + b

@@ -1,6 +1,8 @@
 """The kernel cache: an edited callee is never served stale, and every kind of install finds a place for it."""
 
+import importlib
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
@@ -9,6 +11,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core.registry import CPUDispatcher
 
 import replay
 from replay.numerics import jit
@@ -108,3 +111,21 @@ def test_a_leaf_kernel_that_allocates_fails_to_compile():
 
     with pytest.raises(numba.core.errors.NumbaError):
         allocates(3)
+
+
+def test_leaf_kernels_call_leaf_kernels_only():
+    # What a leaf kernel calls is compiled without reference counting too, if it is the first to call it: something that
+    # allocates would compile or not depending on what ran before.
+    leaves = []
+    for room in jit.KERNEL_ROOMS:
+        package = importlib.import_module(f"replay.{room}")
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            for value in vars(importlib.import_module(found.name)).values():
+                if isinstance(value, CPUDispatcher) and value.targetoptions.get("_nrt") is False:
+                    leaves.append(value.py_func)
+    assert len(leaves) > 50
+    for leaf in leaves:
+        called = (leaf.__globals__.get(name) for name in leaf.__code__.co_names)
+        for callee in called:
+            if isinstance(callee, CPUDispatcher):
+                assert callee.targetoptions.get("_nrt") is False, f"{leaf.__module__}.{leaf.__name__}: {callee}"

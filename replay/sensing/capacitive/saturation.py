@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.geometry.tree import Tree
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import kernel
 from replay.sensing.capacitive.cluster_bounds import place
 from replay.sensing.capacitive.clusters import CENTROID, RADIUS, Clusters
 from replay.sensing.capacitive.contact import SATURATED, contact
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@leaf_kernel
+@kernel
 def saturates(
     clusters: Clusters,
     tree: Tree,
