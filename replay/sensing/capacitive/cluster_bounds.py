@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.clusters import (
     AREA,
     CENTROID,
@@ -42,7 +42,7 @@ _FIFTH = (math.sqrt(7.875), math.sqrt(4.203125), 1.0)
 """Frobenius norm of the form |Pd|^5 P_5(cos) when P drops none, one or two of three components."""
 
 
-@leaf_kernel
+@inlined_kernel
 def place(T: Floats, x: float, y: float, z: float) -> Triple:
     """Return a point of the body in the plate's frame."""
     return (
@@ -52,7 +52,7 @@ def place(T: Floats, x: float, y: float, z: float) -> Triple:
     )
 
 
-@leaf_kernel
+@inlined_kernel
 def judge_cluster(
     nodes: Floats,
     moments: Floats,
@@ -106,7 +106,7 @@ def judge_cluster(
     return KEEP
 
 
-@leaf_kernel
+@inlined_kernel
 def _reach(nodes: Floats, index: int, T: Floats, axis: int, sign: float) -> float:
     """Return how far the node's box reaches from its centroid along a plate axis, sign +1 or -1."""
     reach = 0.0
@@ -116,7 +116,7 @@ def _reach(nodes: Floats, index: int, T: Floats, axis: int, sign: float) -> floa
     return min(reach, nodes[index, RADIUS])  # type: ignore[no-any-return]
 
 
-@leaf_kernel
+@inlined_kernel
 def _faces(nodes: Floats, index: int, centre: Triple) -> int:
     """Return KEEP when all triangles of the node face the plate's centre, DROP when none does, OPEN otherwise.
 
@@ -143,7 +143,7 @@ def _faces(nodes: Floats, index: int, centre: Triple) -> int:
     return DROP if largest < nodes[index, NEAREST_PLANE] - margin else OPEN
 
 
-@leaf_kernel
+@inlined_kernel
 def _border(
     nodes: Floats, moments: Floats, index: int, T: Floats, axis: int, position: float, half: float
 ) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.clusters import FOURTH, SECOND, THIRD
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ _T1 = (30.0 + math.sqrt(480.0)) / 70.0
 _T2 = (30.0 - math.sqrt(480.0)) / 70.0
 
 
-@leaf_kernel
+@inlined_kernel
 def _combine(a: float, t: Form, b: float, q: Form) -> Form:
     return (
         a * t[0] + b * q[0],
@@ -30,7 +30,7 @@ def _combine(a: float, t: Form, b: float, q: Form) -> Form:
     )
 
 
-@leaf_kernel
+@inlined_kernel
 def mean_by_moments(moments: Floats, index: int, T: Floats, u: float, v: float, z: float, r: float) -> float:
     """Return the mean of 1/dist over a node, from its moments up to the fourth.
 

@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.cluster_bounds import ERROR, LEAST, SHIFT, R, X, Y, Z
 from replay.sensing.capacitive.clusters import AREA, Clusters
 from replay.sensing.capacitive.expansion import mean_by_moments
-from replay.sensing.capacitive.refinement import CLUSTER, FREE, PART, RULE, Queue, slots_used
+from replay.sensing.capacitive.part_queue import CLUSTER, FREE, PART, RULE, Queue, slots_used
 from replay.sensing.capacitive.triangle_rules import PART_ABOVE, POINTS_1, mean_by_rule
 from replay.sensing.capacitive.triangle_sum import into_plate
 
 Floats = NDArray[np.float64]
 
 
-@leaf_kernel
+@inlined_kernel
 def doubt_and_least(queue: Queue, least: float) -> tuple[float, float]:
     """Return the sum of the parts' error bounds, and of their lower bounds and `least` [m]."""
     doubt = 0.0
@@ -30,7 +30,7 @@ def doubt_and_least(queue: Queue, least: float) -> tuple[float, float]:
     return doubt, least
 
 
-@leaf_kernel
+@inlined_kernel
 def sum_of_parts(
     clusters: Clusters,
     queue: Queue,

@@ -31,7 +31,6 @@ h the largest distance of a corner from the centroid, d a point's place about it
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +38,12 @@ from numpy.typing import NDArray
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import ERROR, KEEP, LEAST, OPEN, judge_cluster, place
+from replay.sensing.capacitive.cluster_bounds import place
 from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, Clusters
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.part_sum import doubt_and_least, sum_of_parts
-from replay.sensing.capacitive.refinement import (
+from replay.sensing.capacitive.opening import Room, refine
+from replay.sensing.capacitive.part_queue import (
     BUCKETS,
     CLUSTER,
     FREE,
@@ -54,14 +53,12 @@ from replay.sensing.capacitive.refinement import (
     VALUES,
     Queue,
     empty,
-    pop,
-    push,
     slots_used,
 )
+from replay.sensing.capacitive.part_sum import sum_of_parts
 from replay.sensing.capacitive.saturation import saturates
-from replay.sensing.capacitive.triangle_bounds import judge_triangle
 from replay.sensing.capacitive.triangle_cuts import PIECES, triangle_within
-from replay.sensing.capacitive.triangle_rules import POINTS_1, RULE_POINTS
+from replay.sensing.capacitive.triangle_rules import RULE_POINTS
 from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
 
 Floats = NDArray[np.float64]
@@ -73,27 +70,11 @@ NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 """Rows of the counters: tree nodes judged, those summed by their moments, triangles in these, and triangles summed one
 by one; triangles behind the plate or facing away, left out node by node, are the rest."""
 
-_EFFORT_INNER, _EFFORT_LEAF, _EFFORT_RULE = 1.0, 1.7, 0.5
-"""What it costs to open a node, a leaf, or to take a triangle's next rule, one against the other."""
-
 _FIRST_PARTS = 16.0
 """A part with more than this fraction of the whole error is opened before the errors are compared."""
 
 _HARD_SHARE = 1.0 / 128.0
 """What a triangle that has no rule may take of the half of the error that all such triangles may make."""
-
-
-class Room(NamedTuple):
-    """Memory of one sum, used again for the next."""
-
-    queue: Queue
-    stack: Ints  # nodes to judge, and triangles, counted on from the last node
-    hard: Ints  # triangles without a rule
-    found: Floats  # (VALUES,)
-    corners: Floats  # (PIECES, 4, 3)
-    whole: Floats  # (3, 3)
-    scratch: Floats  # SCRATCH
-    terms: Floats  # (RULE_POINTS,)
 
 
 @kernel
@@ -159,9 +140,8 @@ def _sum_one(
     room: Room,
     counts: Ints,
 ) -> tuple[float, bool, float]:
-    queue, stack, hard, found = room.queue, room.stack, room.hard, room.found
-    nodes, moments = clusters.nodes, clusters.moments
-    triangles, areas, parts, corners = clusters.triangles, clusters.areas, clusters.parts, room.corners
+    queue, stack, hard = room.queue, room.stack, room.hard
+    triangles, areas, corners = clusters.triangles, clusters.areas, room.corners
     centre = (
         -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
@@ -170,64 +150,39 @@ def _sum_one(
     if saturates(clusters, tree, T, half_x, half_y, both, facing, stack, corners):
         return math.inf, True, 0.0
     empty(queue)
-    ceiling = rtol * _least_of_root(nodes, T, half_x, half_y)
+    ceiling = rtol * _least_of_root(clusters.nodes, T, half_x, half_y)
     scale = 1.0 / ceiling if ceiling > 0.0 else 1.0
-    first_triangle = len(nodes)
     stack[0] = 0
-    size, count = 1, 0
-    first, limit = POINTS_1, ceiling / _FIRST_PARTS
-    allowed = limit
+    size = 1
     judged, whole, in_whole, alone = 0, 0, 0, 0
     touching = False
     total, lost, least, doubt, spent = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
-        if size > 0:
-            size -= 1
-            task = stack[size]
-            if task < first_triangle:
-                judged += 1
-                verdict = judge_cluster(nodes, moments, task, T, half_x, half_y, both, facing, centre, found)
-                inner = tree.second[task] >= 0
-                if verdict == OPEN or (verdict == KEEP and found[ERROR] > limit):
-                    if inner:
-                        stack[size], stack[size + 1] = tree.second[task], task + 1
-                        size += 2
-                    else:
-                        for k in range(tree.begin[task], tree.end[task]):
-                            stack[size] = first_triangle + k
-                            size += 1
-                    continue
-                part, rule, effort = task, CLUSTER, _EFFORT_INNER if inner else _EFFORT_LEAF
-            else:
-                part, effort = task - first_triangle, _EFFORT_RULE
-                verdict, rule = judge_triangle(
-                    triangles,
-                    areas,
-                    parts,
-                    part,
-                    T,
-                    half_x,
-                    half_y,
-                    both,
-                    facing,
-                    centre,
-                    first,
-                    allowed,
-                    corners,
-                    found,
-                )
-                if verdict == OPEN:
-                    hard[count] = part
-                    count += 1
-            if verdict == KEEP:
-                push(queue, part, rule, found, found[ERROR] * scale / effort)
-                least += found[LEAST]
-                doubt += found[ERROR]
-            continue
-        if count > 0:
-            count -= 1
+        count, opened, least, doubt = refine(
+            clusters,
+            tree,
+            T,
+            half_x,
+            half_y,
+            both,
+            facing,
+            centre,
+            room,
+            size,
+            ceiling / _FIRST_PARTS,
+            scale,
+            rtol,
+            total,
+            least,
+            doubt,
+            spent,
+        )
+        judged += opened
+        size = 0
+        if count == 0:
+            break
+        for k in hard[:count][::-1]:
             alone += 1
-            k = hard[count]
             into_plate(T, triangles, k, corners)
             low = min(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
             high = max(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
@@ -246,32 +201,6 @@ def _sum_one(
             lost += e
             least += value - error
             spent += error
-            continue
-        if doubt + spent <= rtol * least:
-            # once more, without the rounding of sums that went up and down
-            doubt, least = doubt_and_least(queue, total - spent)
-            if doubt + spent <= rtol * least:
-                break
-        slot = pop(queue)
-        if slot < 0:
-            break
-        part, rule = queue.labels[slot, PART], queue.labels[slot, RULE]
-        queue.labels[slot, RULE] = FREE
-        doubt -= queue.values[slot, ERROR]
-        least -= queue.values[slot, LEAST]
-        limit = queue.values[slot, ERROR]
-        first, allowed = POINTS_1, 0.5 * limit
-        if rule != CLUSTER:
-            first = rule + 1
-            stack[0] = first_triangle + part
-            size = 1
-        elif tree.second[part] >= 0:
-            stack[0], stack[1] = tree.second[part], part + 1
-            size = 2
-        else:
-            for k in range(tree.begin[part], tree.end[part]):
-                stack[size] = first_triangle + k
-                size += 1
     for slot in range(slots_used(queue)):
         rule, part = queue.labels[slot, RULE], queue.labels[slot, PART]
         if rule == CLUSTER:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.cluster_bounds import (
     CLOSEST,
     DROP,
@@ -30,7 +30,7 @@ from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
 Floats = NDArray[np.float64]
 
 
-@leaf_kernel
+@inlined_kernel
 def judge_triangle(
     triangles: Floats,
     areas: Floats,
@@ -96,7 +96,7 @@ def judge_triangle(
     return KEEP, rule
 
 
-@leaf_kernel
+@inlined_kernel
 def _side_of_centre(parts: Floats, k: int, centre: Triple) -> int:
     """Return KEEP when a triangle faces the plate's centre, DROP when not, OPEN when `faces_centre` may round it."""
     a, b, c = parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2]

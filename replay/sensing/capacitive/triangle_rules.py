@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.cluster_bounds import CLOSEST
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ RULE_POINTS = 16
 """Most points of a rule."""
 
 
-@leaf_kernel
+@inlined_kernel
 def rule_error(rule: int, area: float, spread: float, h: float, r: float, doubt: float) -> float:
     """Return the error bound [m] of a rule on a triangle of area [m^2], spread [m^2], radius h [m], r [m] away.
 
@@ -42,7 +42,7 @@ def rule_error(rule: int, area: float, spread: float, h: float, r: float, doubt:
     return _RULE_16 * smooth * cube * cube * x + doubt
 
 
-@leaf_kernel
+@inlined_kernel
 def cheapest_rule(
     first: int, area: float, spread: float, h: float, r: float, doubt: float, allowed: float
 ) -> tuple[int, float]:
@@ -54,7 +54,7 @@ def cheapest_rule(
     return NO_RULE, math.inf
 
 
-@leaf_kernel
+@inlined_kernel
 def _over_borders(
     pieces: Floats, index: int, axis: int, centroid: float, half: float, most: float, least: float
 ) -> tuple[float, float]:
@@ -73,7 +73,7 @@ def _over_borders(
     return 0.25 * square * (most + least), 0.25 * square * (most - least)
 
 
-@leaf_kernel
+@inlined_kernel
 def _mean_square(pieces: Floats, index: int, axis: int, sign: float, border: float) -> float:
     """Return the mean of max(sign x coordinate - border, 0)^2 over a piece."""
     p, q, s = (
@@ -93,7 +93,7 @@ def _mean_square(pieces: Floats, index: int, axis: int, sign: float, border: flo
     return max(square, 0.0)  # type: ignore[no-any-return]
 
 
-@leaf_kernel
+@inlined_kernel
 def mean_by_rule(
     rule: int,
     pieces: Floats,
@@ -130,7 +130,7 @@ def mean_by_rule(
     return total
 
 
-@leaf_kernel
+@inlined_kernel
 def borders(
     pieces: Floats, index: int, area: float, x: float, y: float, h: float, r: float, half_x: float, half_y: float
 ) -> tuple[float, float, float]:
@@ -146,7 +146,7 @@ def borders(
     return area * (shift_x + shift_y), area * (doubt_x + doubt_y), area * doubt_x
 
 
-@leaf_kernel
+@inlined_kernel
 def part_above(
     pieces: Floats, area: float, spread: float, h: float, half_x: float, half_y: float
 ) -> tuple[float, float]:

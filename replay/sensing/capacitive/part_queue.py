@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import inlined_kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,20 +40,20 @@ class Queue(NamedTuple):
     state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
 
 
-@leaf_kernel
+@inlined_kernel
 def empty(queue: Queue) -> None:
     """Take out all parts."""
     queue.heads[:] = _NONE
     queue.state[_USED], queue.state[_HIGHEST], queue.state[_UNUSED] = 0, 0, _NONE
 
 
-@leaf_kernel
+@inlined_kernel
 def slots_used(queue: Queue) -> int:
     """Return how many slots there are to look through for parts; FREE ones hold none."""
     return queue.state[_USED]  # type: ignore[no-any-return]
 
 
-@leaf_kernel
+@inlined_kernel
 def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> None:
     """Add a part; urgency >= 0 is its error per effort, of the order of 1 at most."""
     slot = queue.state[_UNUSED]
@@ -71,7 +71,7 @@ def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> N
         queue.values[slot, k] = found[k]
 
 
-@leaf_kernel
+@inlined_kernel
 def pop(queue: Queue) -> int:
     """Take out a part of the highest bucket; return its slot, which is overwritten by the next push, or -1."""
     bucket = queue.state[_HIGHEST]
