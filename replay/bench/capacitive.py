@@ -115,9 +115,16 @@ def _error(rows: Sequence[Row], method: str) -> float:
 
 
 def on_body(name: str, triangles: Floats, *, poses: int, splits: Sequence[int], rounds: int) -> list[Row]:
-    """Return the rows of all methods on one body; plates stand 1 cm to 1.5 m off it, tilted up to 60 degrees."""
-    T_body_plate = around(triangles, poses, near=0.01, far=1.5, tilt=math.radians(60.0))
-    return _race(name, triangles, transforms.invert(T_body_plate), PLATE, splits, TOLERANCES, rounds)
+    """Return the rows of all methods on one body; plates stand 1 cm to 1.5 m off it, tilted up to 60 degrees.
+
+    Plates that the body saturates are left out: the tree answers these without a sum.
+    """
+    T_plate_body = transforms.invert(around(triangles, 3 * poses, near=0.01, far=1.5, tilt=math.radians(60.0)))
+    tree = triangle_tree(triangles)
+    stacked, counts = np.ascontiguousarray(T_plate_body[:, None]), np.zeros(COUNTS, np.int64)
+    rough, _, _ = sum_tree(make_clusters(triangles, tree), tree, stacked, PLATE, False, False, 1e-2, counts)
+    apart = np.flatnonzero(np.isfinite(rough[:, 0]))[:poses]
+    return _race(name, triangles, T_plate_body[apart], PLATE, splits, TOLERANCES, rounds)
 
 
 def _race(
