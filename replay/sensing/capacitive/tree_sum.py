@@ -70,7 +70,7 @@ NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 """Rows of the counters: tree nodes judged, those summed by their moments, triangles in these, and triangles summed one
 by one; triangles behind the plate or facing away, left out node by node, are the rest."""
 
-_FIRST_PARTS = 16.0
+_FIRST_PARTS = 100.0
 """A part with more than this fraction of the whole error is opened before the errors are compared."""
 
 _HARD_SHARE = 1.0 / 128.0
