@@ -11,6 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from distributed import Client
 
 from replay.batch.case import Status
 from replay.batch.run import Execution, Unwatched, run_all
@@ -41,7 +42,10 @@ def cluster(tmp_path):
         while not address.is_file():
             time.sleep(0.1)
             assert scheduler.poll() is None
-        yield json.loads(address.read_text())["address"], workers
+        listening = json.loads(address.read_text())["address"]
+        with Client(listening, timeout=60, set_as_default=False) as client:
+            client.wait_for_workers(len(workers), timeout=60)  # or the first to come gets every task
+        yield listening, workers
     finally:
         for process in (*workers, scheduler):
             family = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
@@ -121,7 +125,11 @@ def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path,
     run = run_all(scenarios, tmp_path / "out", rrd=False, execution=Execution(dask=address), watch=Impatient())
     assert run.interrupted
     statuses = {result.name: result.status for result in run.results}
-    assert statuses == {"good": Status.PASSED, "hang": Status.INTERRUPTED, "good_1": Status.INTERRUPTED}
+    assert statuses.pop("hang") is Status.INTERRUPTED
+    assert sorted(statuses.items()) in (  # which of two equally long ones comes first is the scheduler's choice
+        [("good", Status.PASSED), ("good_1", Status.INTERRUPTED)],
+        [("good", Status.INTERRUPTED), ("good_1", Status.PASSED)],
+    )
     end = time.monotonic() + 10.0
     while computing() != before and time.monotonic() < end:
         time.sleep(0.05)
