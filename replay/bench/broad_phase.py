@@ -16,6 +16,7 @@ from replay.bench.report import Grid, Plot, Report
 from replay.collision.bodies import Bounds, Volumes, collect, fit_volumes
 from replay.collision.broad import COUNTS, sieve
 from replay.collision.columns import Level
+from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.primitives import cuboid
@@ -59,16 +60,15 @@ def tightness(frames: int, rounds: int) -> Grid:
     rows = np.array([[pair.a, pair.b, p, pair.a] for p, pair in enumerate(pairs)], dtype=np.int64)
     relative = np.stack([poses.relative(pair.a, pair.b) for pair in pairs])
     turns = np.ascontiguousarray(np.moveaxis(poses.world[:, :, :3, :3], 1, 0))
-    level, task = np.zeros((frames, len(pairs)), np.uint8), np.zeros((frames, len(pairs)), np.uint8)
+    asked = unanswered(rows, relative, turns)
     contenders: list[Contender] = []
     passed: dict[str, NDArray[np.bool_]] = {}
     for bounds in VOLUMES:
         volumes = fit_volumes(bodies, arrays, bounds=bounds, pieces="exact")
-
-        run = _sieve(volumes, rows, relative, turns, level, task)
+        run = _sieve(volumes, asked)
         run()
-        passed[bounds] = level > 0
-        contenders.append(Contender(bounds, run, level.size, lambda _: Check(0.0)))
+        passed[bounds] = asked.level > 0
+        contenders.append(Contender(bounds, run, asked.level.size, lambda _: Check(0.0)))
     engine = CollisionPipeline(bodies, pairs, poses.linkage, clearance="always")
     touching = engine.run(poses).level == Level.CONTACT
     cells = []
@@ -89,16 +89,9 @@ def tightness(frames: int, rounds: int) -> Grid:
     return Grid(cells)
 
 
-def _sieve(
-    volumes: Volumes,
-    rows: NDArray[np.int64],
-    relative: Floats,
-    turns: Floats,
-    level: NDArray[np.uint8],
-    task: NDArray[np.uint8],
-) -> Callable[[], None]:
-    spreads, scratch, counts = np.empty((len(relative), 2)), np.zeros((8, 4)), np.zeros(COUNTS, np.int64)
-    return lambda: sieve(volumes, rows, relative, turns, 0.0, level, task, counts, spreads, scratch)
+def _sieve(volumes: Volumes, asked: PairFrames) -> Callable[[], None]:
+    spreads, scratch, counts = np.empty((len(asked.poses), 2)), np.zeros((8, 4)), np.zeros(COUNTS, np.int64)
+    return lambda: sieve(volumes, asked, 0.0, counts, spreads, scratch)
 
 
 def crowd(count: int) -> tuple[LinkPoses, list[CollisionBody]]:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import Level
+from replay.collision.pair_frames import PairFrames
+from replay.collision.pipeline import NarrowPhase
 from replay.kinematics.linkage import LinkPoses
 from replay.kinematics.motion import sample
 from replay.recording.record import record_blocks
@@ -148,10 +150,10 @@ class Runner:
                 spent = time.perf_counter() - begin
         return spent
 
-    def _timed(self, narrow_phase: Any) -> Any:
-        def decide(*arguments: Any) -> None:
+    def _timed(self, narrow_phase: NarrowPhase) -> NarrowPhase:
+        def decide(frames: PairFrames, limit: float, counts: NDArray[np.int64]) -> None:
             begin = time.perf_counter()
-            narrow_phase(*arguments)
+            narrow_phase(frames, limit, counts)
             self._narrow += time.perf_counter() - begin
 
         return decide

@@ -14,15 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.bodies import AABB, SPHERE, Volumes
+from replay.collision.pair_frames import REPEAT, RUN, SKIP, PairFrames
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-
-SKIP, RUN, REPEAT = 0, 1, 2
-"""What the narrow phase has to do for a pair in a frame: nothing, look, or copy the frame before."""
 
 COUNTS = 4
 BY_BLOCK, BY_REPEAT, BY_SPHERE, BY_VOLUME = range(COUNTS)
@@ -102,29 +99,18 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
 
 @leaf_kernel
 def sieve(
-    volumes: Volumes,
-    pairs: Integers,
-    poses: Floats,
-    turns: Floats,
-    limit: float,
-    level: Bytes,
-    task: Bytes,
-    counts: Integers,
-    spreads: Floats,
-    scratch: Floats,
+    volumes: Volumes, frames: PairFrames, limit: float, counts: Integers, spreads: Floats, scratch: Floats
 ) -> None:
-    """Fill level (n, P) with 0 clear or 1 bounds, and task (n, P) with SKIP, RUN or REPEAT.
+    """Fill the level of pairs in frames with 0 clear or 1 bounds, and their task with SKIP, RUN or REPEAT.
 
     Args:
         volumes: of all bodies.
-        pairs: (P, 4): body a, body b, row of `poses`, row of `turns`.
-        poses: (Q, n, 4, 4) T_a_b of the links of each pair.
-        turns: (L, n, 3, 3) rotations of links in world, read for kind AABB only.
+        frames: level and task are written.
         limit: pairs farther apart than this are of no interest [m].
-        level, task: out.
         counts: (COUNTS,) added to.
         spreads, scratch: (Q, 2), (8, 4) scratch.
     """
+    pairs, poses, turns, level, task = frames.pairs, frames.poses, frames.turns, frames.level, frames.task
     n = level.shape[0]
     for q in range(len(poses)):
         spreads[q, 0] = -1.0  # not asked for yet
@@ -159,10 +145,9 @@ def sieve(
 
 
 @leaf_kernel
-def keep_all(
-    volumes: Volumes, pairs: Integers, poses: Floats, turns: Floats, level: Bytes, task: Bytes, scratch: Floats
-) -> None:
+def keep_all(volumes: Volumes, frames: PairFrames, scratch: Floats) -> None:
     """Fill level as `sieve` does, and task with RUN: no pair and frame is left out. Arguments as of `sieve`."""
+    pairs, poses, turns, level, task = frames.pairs, frames.poses, frames.turns, frames.level, frames.task
     for p in range(len(pairs)):
         a, b, q, link = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
         for f in range(level.shape[0]):

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.bodies import Bodies
-from replay.collision.broad import REPEAT, RUN
 from replay.collision.narrow import CONTACTS, RUNS, SEEN_INSIDE
+from replay.collision.pair_frames import REPEAT, RUN, PairFrames
 from replay.collision.pairs import CollisionBody
 from replay.collision.traversal import QUERIES, contains_part
 from replay.errors import MissingPackageError
@@ -42,19 +42,10 @@ class FclEngine:
         self._arrays = arrays
         self._parts = [self._geometries(k, body) for k, body in enumerate(bodies)]
 
-    def __call__(
-        self,
-        pairs: Integers,
-        poses: Floats,
-        limit: float,
-        task: NDArray[np.uint8],
-        level: NDArray[np.uint8],
-        clearance: Floats,
-        undecided: NDArray[np.bool_],
-        counts: Integers,
-    ) -> None:
+    def __call__(self, frames: PairFrames, limit: float, counts: Integers) -> None:
         """See `narrow.decide`; `undecided` stays False, since fcl never says so."""
-        for p, (a, b, q, _) in enumerate(pairs.tolist()):
+        poses, task, level, clearance = frames.poses, frames.task, frames.level, frames.clearance
+        for p, (a, b, q, _) in enumerate(frames.pairs.tolist()):
             for f in range(len(task)):
                 if task[f, p] == REPEAT:
                     level[f, p], clearance[f, p] = level[f - 1, p], clearance[f - 1, p]

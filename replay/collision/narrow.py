@@ -7,16 +7,13 @@ from numpy.typing import NDArray
 
 from replay.collision import traversal
 from replay.collision.bodies import Bodies
-from replay.collision.broad import REPEAT, RUN
 from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, workspace
+from replay.collision.pair_frames import REPEAT, RUN, PairFrames
 from replay.collision.scan import closest_of_all
 from replay.collision.traversal import STACK, closest, contains_part
 from replay.numerics.jit import kernel
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
@@ -25,30 +22,18 @@ contacts, and pair-frames that stayed undecided."""
 
 
 @kernel
-def decide(
-    bodies: Bodies,
-    pairs: Integers,
-    poses: Floats,
-    limit: float,
-    task: Bytes,
-    level: Bytes,
-    clearance: Floats,
-    undecided: Flags,
-    counts: Integers,
-    savings: bool,
-) -> None:
-    """Finish level, clearance and undecided, all (n, P), where task asks for it.
+def decide(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers, savings: bool) -> None:
+    """Finish the level, clearance and undecided of pairs in frames where their task asks for it.
 
     Args:
         bodies: of the scene.
-        pairs, poses, task: as `broad.sieve`.
+        frames: as the broad phase left them.
         limit: clearances above it are left NaN [m]; 0 leaves all of them NaN.
-        level: in and out; 2 is contact.
-        clearance: in NaN, out [m].
-        undecided: in False, out.
         counts: (COUNTS,) added to.
         savings: whether box trees and the last frame's answer may shorten the search.
     """
+    pairs, poses, task = frames.pairs, frames.poses, frames.task
+    level, clearance, undecided = frames.level, frames.clearance, frames.undecided
     work = workspace()
     nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
     rotation, translation = np.empty((3, 3)), np.empty(3)

@@ -20,6 +20,7 @@ from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
 from replay.collision.columns import CollisionColumns, CollisionEntries
 from replay.collision.counters import Counters
+from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.relative import RelativePoses
 from replay.collision.selection import Listed, Ruled, Selected
@@ -42,18 +43,8 @@ FEW_PAIRS = 512
 class NarrowPhase(Protocol):
     """What decides the pair-frames that the broad phase leaves; see `narrow.decide` for the arguments."""
 
-    def __call__(
-        self,
-        pairs: Integers,
-        poses: Floats,
-        limit: float,
-        task: NDArray[np.uint8],
-        level: NDArray[np.uint8],
-        clearance: Floats,
-        undecided: NDArray[np.bool_],
-        counts: Integers,
-    ) -> None:
-        """Finish level, clearance and undecided where task asks for it."""
+    def __call__(self, frames: PairFrames, limit: float, counts: Integers) -> None:
+        """Finish level, clearance and undecided where the task asks for it."""
 
 
 class CollisionPipeline:
@@ -223,22 +214,20 @@ class CollisionPipeline:
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
             turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
-        shape = relative.shape[1], len(batch.rows)
-        level, task = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.uint8)
-        clearance, undecided = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+        frames = unanswered(batch.rows, relative, turns)
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
         limit = self._limit
         if self._savings:
-            broad.sieve(self._volumes, batch.rows, relative, turns, limit, level, task, sieved, spreads, scratch)
+            broad.sieve(self._volumes, frames, limit, sieved, spreads, scratch)
         else:
-            broad.keep_all(self._volumes, batch.rows, relative, turns, level, task, scratch)
+            broad.keep_all(self._volumes, frames, scratch)
             limit = math.inf if limit > 0.0 else 0.0
-        self.narrow_phase(batch.rows, relative, limit, task, level, clearance, undecided, decided)
+        self.narrow_phase(frames, limit, decided)
         if not self._savings:
-            clearance[clearance > self._limit] = np.nan
+            frames.clearance[frames.clearance > self._limit] = np.nan
         self.counters.add(sieved.tolist(), decided.tolist())
-        return _Found(batch.columns, batch.rows[:, :2], level, clearance, undecided)
+        return _Found(batch.columns, batch.rows[:, :2], frames.level, frames.clearance, frames.undecided)
 
     def _batches(self, chosen: Selected) -> list[_Batch]:
         """Return pairs in batches that share link pairs."""
@@ -290,16 +279,7 @@ def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings:
 
         return FclEngine(bodies, arrays)
 
-    def decide(
-        pairs: Integers,
-        poses: Floats,
-        limit: float,
-        task: NDArray[np.uint8],
-        level: NDArray[np.uint8],
-        clearance: Floats,
-        undecided: NDArray[np.bool_],
-        counts: Integers,
-    ) -> None:
-        narrow.decide(arrays, pairs, poses, limit, task, level, clearance, undecided, counts, savings)
+    def decide(frames: PairFrames, limit: float, counts: Integers) -> None:
+        narrow.decide(arrays, frames, limit, counts, savings)
 
     return decide

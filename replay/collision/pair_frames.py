@@ -1,0 +1,47 @@
+"""A batch of pairs in all frames of a block: what is asked of the broad and the narrow phase, and what they answer."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+SKIP, RUN, REPEAT = 0, 1, 2
+"""What the narrow phase has to do for a pair in a frame: nothing, look, or copy the frame before."""
+
+
+class PairFrames(NamedTuple):
+    """P pairs in n frames, as kernels take them.
+
+    Attributes:
+        pairs: (P, 4): body a, body b, row of `poses`, row of `turns`.
+        poses: (Q, n, 4, 4) T_a_b of the links of the pairs.
+        turns: (L, n, 3, 3) rotations of links in world, read for boxes along the world's axes only.
+        task: (n, P) SKIP, RUN or REPEAT; written by the broad phase.
+        level: (n, P) 0 clear, 1 bounds, written by the broad phase; 2 contact, by the narrow phase.
+        clearance: (n, P) [m]; NaN where the narrow phase found none within the limit or was not asked.
+        undecided: (n, P).
+    """
+
+    pairs: NDArray[np.int64]
+    poses: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    task: NDArray[np.uint8]
+    level: NDArray[np.uint8]
+    clearance: NDArray[np.float64]
+    undecided: NDArray[np.bool_]
+
+
+def unanswered(pairs: NDArray[np.int64], poses: NDArray[np.float64], turns: NDArray[np.float64]) -> PairFrames:
+    """Return pairs in the frames of their poses, clear and without clearances as yet."""
+    shape = poses.shape[1], len(pairs)
+    return PairFrames(
+        pairs=pairs,
+        poses=poses,
+        turns=turns,
+        task=np.zeros(shape, dtype=np.uint8),
+        level=np.zeros(shape, dtype=np.uint8),
+        clearance=np.full(shape, np.nan),
+        undecided=np.zeros(shape, dtype=bool),
+    )
