@@ -19,7 +19,7 @@ from typing import Any
 from replay.batch.case import CaseOrder, CaseResult
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.worker import Prepare, Work
-from replay.errors import MissingPackageError, NoSpaceError, WorkerError, WriteError
+from replay.errors import InvalidValue, MissingPackageError, NoSpaceError, WorkerError, WriteError
 from replay.logs.part_file import write_file
 
 _SECONDS_TO_CONNECT = 30
@@ -67,13 +67,20 @@ class Cluster:
 
         Raises:
             MissingPackageError: `distributed` is not installed.
+            InvalidValue: the address is none.
             WorkerError: the scheduler does not answer.
             NoSpaceError: the disk is too full for a file that came back.
         """
         try:
             from distributed import Client
+            from distributed.comm.addressing import parse_address, parse_host_port
         except ImportError:
             raise MissingPackageError("distributed", "--dask", "pip install 'replay[dask]'") from None
+        try:  # the library, given an address that is none, takes a minute and a traceback to say so
+            parse_host_port(parse_address(self._address)[1])
+        except ValueError:
+            rule = "must be the scheduler's address and port, such as tcp://host:8786"
+            raise InvalidValue("dask", self._address, rule) from None
         try:
             client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:

@@ -109,6 +109,7 @@ def run_all(
     Raises:
         RecordingExistsError: a recording exists and may not be overwritten; nothing is run then.
         WriteError: the run folder cannot be written; NoSpaceError when the disk becomes full.
+        InvalidValue: the address of a Dask scheduler is none.
         WorkerError: worker processes cannot be started.
     """
     execution, watch, directory = execution or Execution(), watch or Unwatched(), Path(directory)

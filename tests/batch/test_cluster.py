@@ -16,7 +16,7 @@ from distributed import Client
 from replay.batch.case import Status
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.cli.exit_codes import ExitCode
-from replay.errors import WorkerError
+from replay.errors import InvalidValue, WorkerError
 from tests.batch import scenes
 from tests.batch.test_run import files_of
 from tests.cli.test_regress import check_verdicts, night, prepare
@@ -134,6 +134,12 @@ def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path,
     while computing() != before and time.monotonic() < end:
         time.sleep(0.05)
     assert computing() == before
+
+
+@pytest.mark.parametrize("address", ["foo", "", "tcp://host", "tcp://host:port"])
+def test_an_address_without_a_port_is_refused_at_once(tmp_path, address):
+    with pytest.raises(InvalidValue, match="tcp://host:8786"):
+        run_all([scenes.scene("a")], tmp_path, execution=Execution(dask=address))
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(tmp_path, monkeypatch):
