@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from replay.comparison import wording
-from replay.comparison.difference import Difference, SignalDifference
+from replay.comparison.difference import Change, Difference, SignalDifference
 from replay.comparison.runs import Case, RunDifference
 
 SHOWN_SIGNALS = 12
@@ -19,8 +19,10 @@ def text(found: RunDifference, *, verbose: bool = False) -> str:
 
 def _lines(found: RunDifference, verbose: bool) -> Iterator[str]:
     several = len(found.cases) + len(found.missing) + len(found.extra) > 1
+    above: tuple[Change, ...] = ()
     for case in found.cases:
-        yield from _case(case, verbose)
+        yield from _case(case, verbose, above)
+        above = case.difference.provenance or above
     for where, names in (("missing in the candidate", found.missing), ("only in the candidate", found.extra)):
         for name in names:
             yield f"scenario {name}: {where}{' [ignored]' if name in found.ignored else ''}"
@@ -31,13 +33,16 @@ def _lines(found: RunDifference, verbose: bool) -> Iterator[str]:
         )
 
 
-def _case(case: Case, verbose: bool) -> Iterator[str]:
+def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]:
+    """Yield the lines of a scenario; `above` is the provenance that was written last."""
     found = case.difference
     yield f"{found.verdict.value}: {case.name}: {wording.summary(found)}"
     if found.provenance:
         decides = "decides" if found.strict_provenance else "does not decide"
-        yield f"  provenance ({decides})"
-        yield from (f"    {wording.change(change)}" for change in found.provenance)
+        repeats = found.provenance == above
+        yield f"  provenance ({decides}){': as above' if repeats else ''}"
+        if not repeats:
+            yield from (f"    {wording.change(change)}" for change in found.provenance)
     if found.scene:
         yield "  scene"
         yield from (f"    {wording.change(change)}" for change in found.scene)

@@ -112,6 +112,21 @@ def test_verbose_text_lists_what_the_rules_accept_and_why():
     assert "rule abs 1e-12 (r:1): a known last digit (https://x/1)" in long
 
 
+def test_text_tells_the_provenance_of_a_night_once():
+    found, _ = compared()
+    other = Pair(
+        BASELINE, made_up.with_provenance(CANDIDATE, libraries={**BASELINE.provenance.libraries, "numpy": "8.8"})
+    )
+    last = Case("last", Path("a.mcap"), Path("b.mcap"), diff_pair(other, rules=None))
+    lines = text(RunDifference("a", "b", (*found.cases, *found.cases, last))).splitlines()
+    told = [k for k, line in enumerate(lines) if line.startswith("  provenance (does not decide)")]
+    assert [lines[k].partition(")")[2] for k in told] == ["", ": as above", ""]
+    assert [sum(line == f"    libraries.numpy: {np.__version__} -> {v}" for line in lines) for v in ("9.9", "8.8")] == [
+        1,
+        1,
+    ]
+
+
 def test_json_holds_all_of_it_and_is_json():
     found, _ = compared()
     values = json.loads(json.dumps(found.as_json(), allow_nan=False))
