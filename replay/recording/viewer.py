@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from replay.errors import ViewerError
@@ -42,16 +43,24 @@ def show(file: Path, *, web: bool = False) -> None:
     command = [str(viewer_binary()), str(file)]
     if web:
         command += ["--web-viewer", "--bind", "127.0.0.1"]
-    process = subprocess.Popen(command)
+    begun: list[subprocess.Popen[bytes]] = []
     try:
-        code = process.wait()
+        with ThreadPoolExecutor(1) as starter:  # no signal interrupts a thread: a viewer that has begun is known here
+            starter.submit(int).result()  # the thread is there
+            starter.submit(lambda: begun.append(subprocess.Popen(command))).result()
+        code = begun[0].wait()
     finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(timeout=5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        for process in begun:
+            _end(process)
     if code != 0:
         raise ViewerError(f"the rerun viewer failed with code {code}; without a display use --web or --screenshot")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
