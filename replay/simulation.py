@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.numerics import transforms
 from replay.scenario.layout import Layout
 from replay.sensing.columns import CapacitiveColumns, DistanceColumns
 
@@ -52,6 +54,11 @@ class FrameBlock:
     collision: CollisionColumns | None
     distance: DistanceColumns | None
     capacitive: CapacitiveColumns | None
+
+    @cached_property
+    def link_quaternions(self) -> Floats:
+        """The rotations of `link_poses` as unit quaternions (n, L, 4) xyzw, w >= 0."""
+        return transforms.to_quaternion(self.link_poses)
 
 
 class Simulation:

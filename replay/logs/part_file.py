@@ -56,12 +56,20 @@ class PartFile:
         except OSError as error:
             raise write_error(self.path, error) from None
 
+    def finish(self) -> None:
+        """Make the file durable, under the name that it has while it is written; nothing can be appended any more."""
+        try:
+            if not self._stream.closed:
+                self._stream.flush()
+                os.fsync(self._stream.fileno())
+                self._stream.close()
+        except OSError as error:
+            raise write_error(self.path, error) from None
+
     def commit(self) -> None:
         """Make the file durable and give it its name."""
+        self.finish()
         try:
-            self._stream.flush()
-            os.fsync(self._stream.fileno())
-            self._stream.close()
             self.part.replace(self.path)
             _sync_folder(self.path.parent)
         except OSError as error:

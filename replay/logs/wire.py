@@ -100,6 +100,15 @@ class Slot:
             data[:, place :: self.width] = (remaining & np.uint64(0x7F)).astype(np.uint8) | np.uint8(more)
             remaining = remaining >> np.uint64(7)
 
+    def is_like(self, other: Slot) -> bool:
+        """Return whether the same values have the same bytes in both."""
+        mine, theirs = ((slot.field_type, slot.width, slot.count) for slot in (self, other))
+        return mine == theirs
+
+    def copy(self, rows: Rows, other: Slot) -> None:
+        """Set the field in n messages to the values of another one that is like it."""
+        rows[:, self.offset : self.end] = rows[:, other.offset : other.end]
+
     def _read_varints(self, data: Rows) -> Column:
         if self.width == 1 and self.field_type not in _ZIGZAG:
             narrow: Column = data.astype(_VARINT[self.field_type])

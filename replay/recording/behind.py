@@ -1,6 +1,7 @@
 """Writing beside computing: blocks are written in a thread of their own while the next ones are computed.
 
-Kernels release the interpreter and so does compression, so that on two cores most of the writing costs no time.
+Kernels release the interpreter and so does compression, so that on two cores most of the writing costs no time. One
+thread writes all files: several would take the interpreter from each other, which costs more than it gains.
 """
 
 from __future__ import annotations
@@ -26,8 +27,11 @@ class Writer(Protocol):
     def write(self, block: FrameBlock) -> None:
         """Append a block."""
 
-    def close(self) -> None:
-        """Finish the file."""
+    def finish(self) -> None:
+        """Write all that is left, or begin to; called once, after the last block."""
+
+    def commit(self) -> None:
+        """Wait until all is written, and give the file its name."""
 
     def discard(self) -> None:
         """Give the file up."""
@@ -36,8 +40,11 @@ class Writer(Protocol):
 class WriteBehind:
     """Feeds the same blocks to several writers, in order, from a thread.
 
-    As a context: at its end the writers are closed, in order, or all discarded when an error is on its way; an error
-    in the thread is raised by the next `put` or at the end.
+    The first writer takes all blocks that wait before the next one has its turn, so that at the end of a run it closes
+    its file while the others still write.
+
+    As a context: at its end the writers are finished, then committed in order, or all discarded when there was an
+    error; an error in the thread is raised by the next `put` or at the end.
     """
 
     def __init__(self, writers: Sequence[Writer]) -> None:
@@ -56,31 +63,42 @@ class WriteBehind:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        self._error = self._error or error  # then nothing more is written
         self._queue.put(None)
         self._thread.join()
-        closed = 0
+        committed = 0
         try:
             if error is None:
                 self._raise()
                 for writer in self._writers:
-                    writer.close()
-                    closed += 1
+                    writer.commit()
+                    committed += 1
         finally:
-            for writer in self._writers[closed:]:
+            for writer in self._writers[committed:]:
                 writer.discard()
 
     def _work(self) -> None:
-        self._guard(self._prepare)  # while the first block is computed
-        while (block := self._queue.get()) is not None:
-            self._guard(self._write, block)
-
-    def _prepare(self) -> None:
         for writer in self._writers:
-            writer.prepare()
+            self._guard(writer.prepare)  # while the first block is computed
+        first, *others = self._writers
+        ended = False
+        while not ended:
+            taken: list[FrameBlock | None] = []
+            while not ended and (not taken or (len(taken) <= _BLOCKS_BEHIND and not self._queue.empty())):
+                item = self._queue.get()
+                ended = item is None
+                self._serve(first, item)
+                taken.append(item)
+            for writer in others:
+                for item in taken:
+                    self._serve(writer, item)
 
-    def _write(self, block: FrameBlock) -> None:
-        for writer in self._writers:
-            writer.write(block)
+    def _serve(self, writer: Writer, item: FrameBlock | None) -> None:
+        """Let a writer append a block, or finish after the last one."""
+        if item is None:
+            self._guard(writer.finish)
+        else:
+            self._guard(writer.write, item)
 
     def _guard(self, task: Callable[..., None], *arguments: FrameBlock) -> None:
         """Run a task and keep its error; after one, blocks are only taken, so that `put` cannot wait for ever."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,27 +31,21 @@ _BACKGROUND = (38, 42, 48)
 _PANELS = ("BlueprintPanel", "SelectionPanel")
 
 
-def blueprint(charts: Sequence[str], corners: Floats, end: int) -> Any:
-    """Return the rerun blueprint.
+def recording(charts: Collection[str], eye: Any, axis: Any) -> Any:
+    """Return the rerun blueprint of one recording.
 
     Args:
         charts: which of DISTANCE, CAPACITIVE, CLEARANCE and JOINTS have curves.
-        corners: (n, 3) points [m] in world coordinates that the first picture should show.
-        end: time [ns] at which the charts end.
+        eye: from where the scene is looked at, see `eye_of`.
+        axis: time axis of the charts, see `axis_until`.
     """
     import rerun.blueprint as rrb
 
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    middle = 0.5 * (low + high)
-    distance = 0.85 * float(np.linalg.norm(high - low)) + 0.1
-    eye = middle + distance * _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION)
-    readings = [chart(name, end) for name in (DISTANCE, CAPACITIVE, CLEARANCE) if name in charts]
-    behind = [chart(name, end) for name in (JOINTS,) if name in charts]
+    readings = [chart(name, axis) for name in (DISTANCE, CAPACITIVE, CLEARANCE) if name in charts]
+    behind = [chart(name, axis) for name in (JOINTS,) if name in charts]
     scenario = rrb.TextDocumentView(origin=f"/{SCENARIO}", name="Scenario")
     below = rrb.Tabs(event_table(), *behind, scenario, active_tab=0)
-    return whole(
-        rrb.Horizontal(scene_view(eye, middle), rrb.Vertical(*readings, below), column_shares=[3, 2]),
-    )
+    return whole(rrb.Horizontal(scene_view(eye), rrb.Vertical(*readings, below), column_shares=[3, 2]))
 
 
 def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Floats, target: Floats, end: int) -> Any:
@@ -59,21 +53,20 @@ def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Floats, targe
 
     Args:
         sides: what the recordings are called; the entities of each stand below its name.
-        charts, end: as of `blueprint`, of all together.
+        charts: as of `recording`, of all together.
         eye, target: (3,) [m], from where to where every scene is looked at.
+        end: time [ns] at which the charts end.
     """
     import rerun as rr
     import rerun.blueprint as rrb
 
-    columns = []
+    columns, look = [], eye_at(eye, target)
     for side in sides:
         prefix = f"/{rr.escape_entity_path_part(side)}"
-        curves = [chart(name, end, prefix) for name in _TITLES if name in charts]
+        curves = [chart(name, axis_until(end), prefix) for name in _TITLES if name in charts]
         below = [rrb.Tabs(*curves, active_tab=0)] if curves else []
         shares = [5, 3, 2] if curves else [5, 2]
-        columns.append(
-            rrb.Vertical(scene_view(eye, target, prefix, side), *below, event_table(prefix), row_shares=shares)
-        )
+        columns.append(rrb.Vertical(scene_view(look, prefix, side), *below, event_table(prefix), row_shares=shares))
     return whole(rrb.Horizontal(*columns))
 
 
@@ -85,8 +78,33 @@ def whole(container: Any) -> Any:
     return rrb.Blueprint(container, *closed, rrb.TimePanel(state="collapsed", timeline=TIMELINE), auto_views=False)
 
 
-def scene_view(eye: Floats, target: Floats, prefix: str = "", name: str = "Scene") -> Any:
-    """Return a view of the scene below a prefix, looked at from `eye` to `target`, (3,) [m]."""
+def eye_of(low: Floats, high: Floats) -> Any:
+    """Return an eye that sees the box between two corners (3,) [m] in world coordinates."""
+    middle = 0.5 * (low + high)
+    distance = 0.85 * float(np.linalg.norm(high - low)) + 0.1
+    return eye_at(middle + distance * _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION), middle)
+
+
+def eye_at(position: Floats, target: Floats) -> Any:
+    """Return an eye at a position that looks to a target, (3,) [m], upright."""
+    import rerun.blueprint as rrb
+
+    return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
+
+
+def axis_until(end: int) -> Any:
+    """Return the time axis of a chart from 0 to `end` [ns]."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    span = rr.TimeRange(
+        start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.absolute(seconds=max(end, 1) / 1e9)
+    )
+    return rrb.TimeAxis(view_range=span)
+
+
+def scene_view(eye: Any, prefix: str = "", name: str = "Scene") -> Any:
+    """Return a view of the scene below a prefix."""
     import rerun.blueprint as rrb
 
     return rrb.Spatial3DView(
@@ -95,7 +113,7 @@ def scene_view(eye: Floats, target: Floats, prefix: str = "", name: str = "Scene
         name=name,
         background=rrb.Background(color=_BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(255, 255, 255, 18)),
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0)),
+        eye_controls=eye,
     )
 
 
@@ -108,17 +126,13 @@ def event_table(prefix: str = "") -> Any:
     return rrb.TextLogView(origin=f"{prefix}/{EVENTS}", name="Events", columns=columns)
 
 
-def chart(name: str, end: int, prefix: str = "") -> Any:
-    """Return a chart of the curves below a prefix, from 0 to `end` [ns]."""
-    import rerun as rr
+def chart(name: str, axis: Any, prefix: str = "") -> Any:
+    """Return a chart of the curves below a prefix over a time axis."""
     import rerun.blueprint as rrb
 
-    span = rr.TimeRange(
-        start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.absolute(seconds=max(end, 1) / 1e9)
-    )
     return rrb.TimeSeriesView(
         origin=f"{prefix}/{name}",
         name=_TITLES[name],
-        axis_x=rrb.TimeAxis(view_range=span),
+        axis_x=axis,
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )

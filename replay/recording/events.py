@@ -160,15 +160,18 @@ class EventFinder:
         """Return the events of the next block, by frame, and within a frame by kind and name."""
         frames, codes = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
         for kind, state in _states(block):
-            changed = state != np.concatenate([self._last[kind][None], state[:-1]])
+            changed = np.empty(state.shape, dtype=np.bool_)
+            np.not_equal(state[0], self._last[kind], out=changed[0])
+            np.not_equal(state[1:], state[:-1], out=changed[1:])
             self._last[kind] = state[-1].copy()
-            frame, index = np.nonzero(changed)
-            frames.append(frame)
-            codes.append(self._first[kind] + 2 * index + state[frame, index])
+            found = np.flatnonzero(changed)
+            if len(found):
+                frames.append(found // state.shape[1])
+                codes.append(self._first[kind] + 2 * (found % state.shape[1]) + state.reshape(-1)[found])
         frame = np.concatenate(frames)
-        found, code = np.unique(np.concatenate(codes), return_inverse=True)
+        numbers, code = np.unique(np.concatenate(codes), return_inverse=True)
         order = np.argsort(frame, kind="stable")
-        transitions = tuple(self._transition(number) for number in found.tolist())
+        transitions = tuple(self._transition(number) for number in numbers.tolist())
         return Events(block.time[frame[order]], block.first + frame[order], code[order], transitions)
 
     def _transition(self, number: int) -> Transition:

@@ -11,6 +11,7 @@ import contextlib
 import os
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ class RerunFile:
         self.stream: Any = None
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
+        self._closing: threading.Thread | None = None
 
     def open(self, application: str, **options: Any) -> Any:
         """Open the stream and return it; `options` are those of rerun.RecordingStream.save."""
@@ -64,22 +66,31 @@ class RerunFile:
             raise WriteError(str(self.path), f"not all of it was written: {error}") from None
         self._check()
 
+    def finish(self, last: Callable[[], None] | None = None) -> None:
+        """Begin to finish the recording in the background: `last` is done, all is written, the file is made durable."""
+        if self.stream is not None and self._closing is None:
+            self._closing = threading.Thread(target=self._close, args=(last,), name="replay-rrd-end", daemon=True)
+            self._closing.start()
+
     def commit(self) -> None:
         """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""
-        if self.stream is not None:
-            self.flush()
-            self._close()
-            self._check()
+        self._wait()
+        self._check()
         self._file.commit()
 
     def discard(self) -> None:
         """Give the recording up and remove the unfinished file."""
-        if self.stream is not None:
-            self._close()
+        self._wait()
         self._file.discard()
+
+    def _wait(self) -> None:
+        self.finish()
+        if self._closing is not None:
+            self._closing.join()
 
     def _open_pipe(self, options: dict[str, Any]) -> None:
         source, sink = os.pipe()
+        _widen(sink)
         self._thread = threading.Thread(target=self._copy, args=(source,), name="replay-rrd", daemon=True)
         self._thread.start()
         try:
@@ -91,16 +102,34 @@ class RerunFile:
         with contextlib.closing(os.fdopen(source, "rb", buffering=0)) as pipe:
             while data := pipe.read(_PIECE):
                 if self._error is None:  # after an error the rest is only taken, so that nobody waits
-                    try:
-                        self._file.write(data)
-                    except BaseException as error:
-                        self._error = error
+                    self._guard(self._file.write, data)
 
-    def _close(self) -> None:
-        self.stream.disconnect()
+    def _close(self, last: Callable[[], None] | None) -> None:
+        if last is not None:
+            self._guard(last)
+        self._guard(self.flush)
+        self._guard(self.stream.disconnect)
         if self._thread is not None:
             self._thread.join()
+        if self._error is None:
+            self._guard(self._file.finish)
+
+    def _guard(self, task: Callable[..., None], *arguments: bytes) -> None:
+        """Run a task and keep the first error: nobody waits for this thread until the end."""
+        try:
+            task(*arguments)
+        except BaseException as error:
+            self._error = self._error or error
 
     def _check(self) -> None:
         if self._error is not None:
             raise self._error
+
+
+def _widen(pipe: int) -> None:
+    """Let a pipe hold as much as is read from it at once, so that the library need not wait for the interpreter."""
+    if sys.platform == "linux":
+        import fcntl
+
+        with contextlib.suppress(OSError):  # a user may have many pipes, or less room for them
+            fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _PIECE)

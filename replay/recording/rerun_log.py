@@ -6,6 +6,7 @@ after it, as NaN, so that gaps stay gaps. The bytes differ from run to run; the 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from replay.collision.columns import Level
 from replay.numerics import transforms
 from replay.recording import blueprint
+from replay.recording.blueprint_parts import RecordingBlueprint
 from replay.recording.events import EventFinder
+from replay.recording.rerun_columns import Chunks, Column, Index, column, entity, index_of, packed
 from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_scene import body_path, extent, log_curve, log_scene
 from replay.recording.scene_view import SceneView
@@ -49,9 +52,10 @@ class RerunWriter:
         self._scene = scene
         self._events = EventFinder(layout)
         self._stream: Any = None
+        self._chunks: Any = None
         self._last: dict[str, Any] = {}
         self._named: set[tuple[str, str]] = set()
-        self._index: list[Any] = []
+        self._indexes: dict[bytes, Index] = {}
         self._members = self._bodies_of_pairs()
         self._corners = np.zeros((0, 3))
         self._end = 0
@@ -61,7 +65,9 @@ class RerunWriter:
         """Begin the file with all that does not change."""
         self._stream = stream = self._file.open(APPLICATION)
         stream.send_recording_name(self._scene.name)
-        log_scene(stream, self._scene, self._members)
+        self._chunks = Chunks()
+        log_scene(self._chunks, self._scene, self._members)
+        self._chunks.send(stream)
 
     def write(self, block: FrameBlock) -> None:
         """Append a block."""
@@ -70,7 +76,7 @@ class RerunWriter:
         if self._blocks == 0:
             self._corners = extent(self._scene, block.link_poses[0])
         self._end = int(block.time[-1])
-        self._index = _index(block.time, block.first + np.arange(len(block.time)))
+        self._indexes.clear()
         self._poses(block)
         self._colors(block)
         self._distance(block)
@@ -80,51 +86,57 @@ class RerunWriter:
         everywhere = np.ones(block.joint_positions.shape, dtype=np.bool_)
         self._curves(block, blueprint.JOINTS, self._layout.joints, block.joint_positions, everywhere, titles)
         self._log_events(block)
+        self._chunks.send(self._stream)
         self._blocks += 1
         if self._blocks % _BLOCKS_UNWRITTEN == 0:
             self._file.flush()
 
-    def close(self) -> None:
-        """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""
+    def finish(self) -> None:
+        """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
-            charts = sorted({chart for chart, _ in self._named})
-            self._stream.send_blueprint(blueprint.blueprint(charts, self._corners, self._end), make_active=False)
+            layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
+            self._file.finish(functools.partial(self._stream.send_blueprint, layout, make_active=False))
+            self._stream = None
+
+    def commit(self) -> None:
+        """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""
+        self.finish()
         self._file.commit()
 
     def discard(self) -> None:
         """Give the recording up and remove the unfinished file."""
         self._file.discard()
 
-    def _send(self, block: FrameBlock, rows: Flags, path: list[str], *columns: Any) -> None:
-        import rerun as rr
-
-        index = self._index
-        if not rows.all():
-            index = _index(block.time[rows], block.first + np.flatnonzero(rows))
-        for group in columns:
-            self._stream.send_columns(rr.new_entity_path(path), indexes=index, columns=group, strict=True)
+    def _send(self, block: FrameBlock, rows: Flags, path: str, *columns: Column) -> None:
+        """Send columns that have a value in those rows of the block; rows alike share their times."""
+        key = rows.tobytes()
+        if key not in self._indexes:
+            frames = np.flatnonzero(rows)
+            self._indexes[key] = index_of(block.time[frames], block.first + frames)
+        self._chunks.add(path, self._indexes[key], columns)
 
     def _changed(self, key: str, values: NDArray[Any]) -> Flags:
         """Return in which frames each of k values (n, k, ...) is not that of the frame before, (n, k)."""
         rows = np.ones(values.shape[:2], dtype=np.bool_)
-        inner = tuple(range(2, values.ndim))
-        rows[1:] = (values[1:] != values[:-1]).any(axis=inner)
+        flat = values.reshape(*values.shape[:2], -1)
+        rows[1:] = (flat[1:] != flat[:-1]).any(axis=2)
         if key in self._last:
-            rows[0] = (values[0] != self._last[key]).any(axis=tuple(axis - 1 for axis in inner))
-        self._last[key] = values[-1].copy()
+            rows[0] = (flat[0] != self._last[key]).any(axis=1)
+        self._last[key] = flat[-1].copy()
         return rows
 
     def _poses(self, block: FrameBlock) -> None:
-        import rerun as rr
-
-        moved = self._changed("poses", block.link_poses)
-        quaternions = transforms.to_quaternion(block.link_poses)
-        for link in np.flatnonzero(moved.any(axis=0)).tolist():
-            rows = moved[:, link]
-            columns = rr.Transform3D.columns(
-                translation=block.link_poses[rows, link, :3, 3], quaternion=quaternions[rows, link]
-            )
-            self._send(block, rows, [blueprint.SCENE, self._layout.links[link]], columns)
+        moved = self._changed("poses", block.link_poses).T
+        link_of, frame_of = np.nonzero(moved)
+        places = block.link_poses[frame_of, link_of, :3, 3].astype(np.float32)
+        turns = block.link_quaternions[frame_of, link_of].astype(np.float32)
+        end = 0
+        for name, rows, count in zip(self._layout.links, moved, moved.sum(axis=1).tolist(), strict=True):
+            begin, end = end, end + count
+            if count:
+                place = column("Transform3D", "translation", places[begin:end], 1)
+                turn = column("Transform3D", "quaternion", turns[begin:end], 1)
+                self._send(block, rows, entity(blueprint.SCENE, name), place, turn)
 
     def _bodies_of_pairs(self) -> dict[int, list[int]]:
         """Return, for each drawn body that is in a pair, the pairs that it is in."""
@@ -137,23 +149,20 @@ class RerunWriter:
         return members
 
     def _colors(self, block: FrameBlock) -> None:
-        import rerun as rr
-
         if block.collision is None or not self._members:
             return
-        levels = np.stack([block.collision.level[:, pairs].max(axis=1) for pairs in self._members.values()], axis=1)
-        changed = self._changed("levels", levels)
-        for column, k in enumerate(self._members):
-            rows = changed[:, column]
+        pairs = np.concatenate(list(self._members.values()))
+        begins = np.cumsum([0, *map(len, self._members.values())])[:-1]
+        levels = np.maximum.reduceat(np.ascontiguousarray(block.collision.level.T)[pairs], begins)
+        changed = self._changed("levels", levels.T).T
+        warnings = LEVEL_COLORS[Level.BOUNDS], LEVEL_COLORS[Level.CONTACT]
+        palettes = packed([color for k in self._members for color in (self._scene.bodies[k].color, *warnings)])
+        for k, palette, rows, level in zip(self._members, palettes.reshape(-1, 3), changed, levels, strict=True):
             if rows.any():
-                body = self._scene.bodies[k]
-                palette = [body.color, LEVEL_COLORS[Level.BOUNDS], LEVEL_COLORS[Level.CONTACT]]
-                colors = np.array(palette, dtype=np.uint8)[levels[rows, column]]
-                self._send(block, rows, body_path(self._scene, body), rr.Mesh3D.columns(albedo_factor=colors))
+                colors = column("Mesh3D", "albedo_factor", palette[level[rows]], 1)
+                self._send(block, rows, body_path(self._scene, self._scene.bodies[k]), colors)
 
     def _distance(self, block: FrameBlock) -> None:
-        import rerun as rr
-
         if block.distance is None:
             return
         names, seen = self._layout.distance_sensors, block.distance.status != Detection.NOTHING
@@ -162,20 +171,19 @@ class RerunWriter:
         shown = [sensor for sensor, name in enumerate(names) if name in cones]
         if not shown:
             return
-        apexes = [
-            transforms.compose(block.link_poses[:, cones[names[k]].link], cones[names[k]].T_link_sensor)[:, :3, 3]
-            for k in shown
-        ]
-        ends = np.stack([np.stack(apexes, axis=1), block.distance.point[:, shown]], axis=2)
+        placed = [cones[names[sensor]] for sensor in shown]
+        origins = np.stack([cone.T_link_sensor[:3, 3] for cone in placed])
+        apexes = transforms.apply(block.link_poses[:, [cone.link for cone in placed]], origins)
+        ends = np.stack([apexes, block.distance.point[:, shown]], axis=2)
         changed = self._changed("beams", np.where(seen[:, shown, None, None], ends, 0.0))
-        for column, sensor in enumerate(shown):
-            rows = changed[:, column]
+        for place, sensor in enumerate(shown):
+            rows = changed[:, place]
             if rows.any():
-                drawn = ends[rows & seen[:, sensor], column]
+                drawn = ends[rows & seen[:, sensor], place]
                 lengths = seen[rows, sensor].astype(np.int64)  # no strip at all while nothing is seen
-                strips = rr.LineStrips3D.columns(strips=drawn).partition(lengths)
-                points = rr.Points3D.columns(positions=drawn[:, 1]).partition(lengths)
-                self._send(block, rows, [blueprint.SCENE, "closest_points", names[sensor]], strips, points)
+                strips = column("LineStrips3D", "strips", drawn, lengths, 2)
+                points = column("Points3D", "positions", drawn[:, 1], lengths)
+                self._send(block, rows, entity(blueprint.SCENE, "closest_points", names[sensor]), strips, points)
 
     def _capacitive(self, block: FrameBlock) -> None:
         if block.capacitive is not None:
@@ -197,46 +205,30 @@ class RerunWriter:
         titles: Sequence[str] | None = None,
     ) -> None:
         """Append curves (n, k) to a chart where they have a value, `present`; `titles` are the names if left out."""
-        import rerun as rr
-
         rows = present.copy()
         rows[1:] |= present[:-1]
         rows[0] |= self._last.get(chart, False)
         self._last[chart] = present[-1].copy()
+        shown = np.where(present, values, np.nan).T
         for k in np.flatnonzero(rows.any(axis=0)).tolist():
-            path = [chart, names[k]]
+            path = entity(chart, names[k])
             if (chart, names[k]) not in self._named:
-                log_curve(self._stream, path, (titles or names)[k], self._number_of(chart))
+                log_curve(self._chunks, path, (titles or names)[k], self._number_of(chart))
                 self._named.add((chart, names[k]))
             here = rows[:, k]
-            shown = np.where(present[here, k], values[here, k], np.nan)
-            self._send(block, here, path, rr.Scalars.columns(scalars=shown))
+            self._send(block, here, path, column("Scalars", "scalars", shown[k, here], 1))
 
     def _number_of(self, chart: str) -> int:
         """Return the number of the curve that is added to a chart next."""
         return sum(named == chart for named, _ in self._named)
 
     def _log_events(self, block: FrameBlock) -> None:
-        import rerun as rr
-
         events = self._events.find(block)
-        if not events:
+        if not len(events):
             return
-        index = _index(events.time, events.frame)
         texts = [what.text for what in events.transitions]
         levels = [_LOG_LEVELS[what.severity] for what in events.transitions]
         codes = events.code.tolist()
-        columns = rr.TextLog.columns(
-            text=[f"{time / 1e9:.3f} s  {texts[code]}" for time, code in zip(events.time.tolist(), codes, strict=True)],
-            level=[levels[code] for code in codes],
-        )
-        self._stream.send_columns(blueprint.EVENTS, indexes=index, columns=columns, strict=True)
-
-
-def _index(time: NDArray[np.int64], frames: NDArray[np.int64]) -> list[Any]:
-    import rerun as rr
-
-    return [
-        rr.TimeColumn(blueprint.TIMELINE, duration=time.astype("timedelta64[ns]")),
-        rr.TimeColumn("frame", sequence=frames),
-    ]
+        lines = [f"{time / 1e9:.3f} s  {texts[code]}" for time, code in zip(events.time.tolist(), codes, strict=True)]
+        text, level = column("TextLog", "text", lines, 1), column("TextLog", "level", [levels[k] for k in codes], 1)
+        self._chunks.add(blueprint.EVENTS, index_of(events.time, events.frame), [text, level])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import Any
+import functools
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from replay.numerics import transforms
 from replay.recording import blueprint
-from replay.recording.scene_view import BodyView, Color, Floats, SceneView, indexed
+from replay.recording.rerun_columns import Chunks, Column, column, constants, entity, packed, row
+from replay.recording.scene_view import BodyView, Color, Floats, SceneView
 from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
 
 CONE = (110, 190, 255, 140)
@@ -27,56 +28,52 @@ CURVES = (
 )
 """Colours of curves, told apart on a dark ground."""
 
-Path = list[str]
+_CORNERS = np.array([[[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]], dtype=np.bool_)
 
 
-def body_path(scene: SceneView, body: BodyView) -> Path:
+def body_path(scene: SceneView, body: BodyView) -> str:
     """Return the entity of a body: below its link's, under its own name."""
-    return [blueprint.SCENE, scene.links[body.link], body.name.rpartition("/")[2]]
+    return entity(blueprint.SCENE, scene.links[body.link], body.name.rpartition("/")[2])
 
 
-def log_scene(stream: Any, scene: SceneView, colored: Collection[int]) -> None:
+def log_scene(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> None:
     """Log everything that does not change; the colours of the bodies in `colored` do."""
-    import rerun as rr
-
-    stream.log(blueprint.SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    normals = np.split(corner_normals(scene.meshes), scene.meshes.first_triangle[1:-1])
-    for k, body in enumerate(scene.bodies):
-        _log_mesh(stream, body_path(scene, body), body.triangles, normals[k], None if k in colored else body.color)
+    chunks.add(blueprint.SCENE, {}, _axes())
+    _log_bodies(chunks, scene, colored)
     for cone in scene.cones:
-        lines = rr.LineStrips3D(cone_strips(cone), colors=CONE, radii=rr.Radius.ui_points(0.8))
-        stream.log([blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor], lines, static=True)
-        beam = [blueprint.SCENE, "closest_points", cone.sensor]
-        stream.log(beam, _only(rr.LineStrips3D, colors=BEAM, radii=rr.Radius.ui_points(2.0)), static=True)
-        stream.log(beam, _only(rr.Points3D, colors=BEAM, radii=rr.Radius.ui_points(5.0)), static=True)
-    _log_plates(stream, scene)
-    stream.log(blueprint.SCENARIO, rr.TextDocument(_document(scene), media_type="text/markdown"), static=True)
+        lines = _lines(cone_strips(cone), CONE, 0.8)
+        chunks.add(entity(blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor), {}, lines)
+        chunks.add(entity(blueprint.SCENE, "closest_points", cone.sensor), {}, _beam())
+    _log_plates(chunks, scene)
+    text = row("TextDocument", "text", [_document(scene)])
+    chunks.add(blueprint.SCENARIO, {}, [text, row("TextDocument", "media_type", ["text/markdown"])])
 
 
-def _log_plates(stream: Any, scene: SceneView) -> None:
-    import rerun as rr
+def _log_bodies(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> None:
+    meshes = scene.meshes
+    corners, normals = meshes.triangles.reshape(-1, 3), corner_normals(meshes).reshape(-1, 3)
+    ends = (3 * meshes.first_triangle).tolist()
+    for k, (body, begin, end) in enumerate(zip(scene.bodies, ends, ends[1:], strict=False)):
+        color = None if k in colored else body.color  # what is static cannot change later
+        chunks.add(body_path(scene, body), {}, _mesh(corners[begin:end], normals[begin:end], color))
 
-    corners = [plate_corners(plate) for plate in scene.plates]
-    meshes = indexed([four[[[0, 1, 2], [0, 2, 3]]] for four in corners])
-    normals = corner_normals(meshes).reshape(-1, 2, 3, 3)
+
+def _log_plates(chunks: Chunks, scene: SceneView) -> None:
     outlines: dict[tuple[str, ...], list[Floats]] = {}
-    for plate, four, triangles, across in zip(
-        scene.plates, corners, meshes.triangles.reshape(-1, 2, 3, 3), normals, strict=True
-    ):
+    for plate in scene.plates:
         path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
-        _log_mesh(stream, path, triangles, across, PLATE)
+        four = plate_corners(plate)
+        across = np.broadcast_to(plate.T_link_plate[:3, 2], (6, 3))
+        chunks.add(entity(*path), {}, _mesh(four[[0, 1, 2, 0, 2, 3]], across, PLATE))
         outlines.setdefault((*path[:-1], "outline"), []).append(four[[0, 1, 2, 3, 0]])
     for place, strips in outlines.items():
-        lines = rr.LineStrips3D(strips, colors=PLATE, radii=rr.Radius.ui_points(1.0))
-        stream.log(list(place), lines, static=True)
+        chunks.add(entity(*place), {}, _lines(strips, PLATE, 1.0))
 
 
-def log_curve(stream: Any, path: Path, name: str, number: int) -> None:
+def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:
     """Log how a curve is called in its chart, and its colour: that of its number there."""
-    import rerun as rr
-
     color = CURVES[number % len(CURVES)]  # the viewer's own colours follow from names and may be alike
-    stream.log(path, rr.SeriesLines(names=name, widths=1.5, colors=color), static=True)
+    chunks.add(path, {}, [row("SeriesLines", "names", [name]), *_curve(color)])
 
 
 def extent(scene: SceneView, link_poses: Floats) -> Floats:
@@ -86,31 +83,58 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
         link_poses: (L, 4, 4), T_world_link in one frame.
     """
-    boxes: list[Floats] = []
-    flat: list[Floats] = []
-    for body in scene.bodies:
-        points = body.triangles.reshape(-1, 3)
-        if not len(points):
-            continue
-        low, high = points.min(axis=0), points.max(axis=0)
-        box = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-        (boxes if (high > low).all() else flat).append(transforms.apply(link_poses[body.link], box))
-    return np.concatenate(boxes or flat or [np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])])
+    counts = np.diff(scene.meshes.first_vertex)
+    bodies = [body for body, count in zip(scene.bodies, counts.tolist(), strict=True) if count]
+    if not bodies:
+        return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    begins = scene.meshes.first_vertex[:-1][counts > 0]
+    low = np.minimum.reduceat(scene.meshes.vertices, begins)
+    high = np.maximum.reduceat(scene.meshes.vertices, begins)
+    solid = (high > low).all(axis=1)
+    shown = solid if solid.any() else ~solid
+    box = np.where(_CORNERS, high[shown, None], low[shown, None])
+    links = np.array([body.link for body in bodies])[shown]
+    return transforms.apply(link_poses[links, None], box).reshape(-1, 3)
 
 
-def _log_mesh(stream: Any, path: Path, triangles: Floats, normals: Floats, color: Color | None) -> None:
+def _mesh(corners: Floats, normals: Floats, color: Color | None) -> list[Column]:
+    tint = [] if color is None else [row("Mesh3D", "albedo_factor", packed([color]))]
+    return [row("Mesh3D", "vertex_positions", corners), row("Mesh3D", "vertex_normals", normals), *tint]
+
+
+def _lines(strips: Sequence[Floats], color: Color, width: float) -> list[Column]:
+    points = np.array([len(strip) for strip in strips], dtype=np.int64)
+    return [column("LineStrips3D", "strips", np.concatenate(strips), len(strips), points), *_pen(color, width)]
+
+
+@functools.cache
+def _pen(color: Color, width: float) -> tuple[Column, ...]:
     import rerun as rr
 
-    mesh = rr.Mesh3D(
-        vertex_positions=triangles.reshape(-1, 3),
-        vertex_normals=normals.reshape(-1, 3),
-        albedo_factor=color,  # what is static cannot change later
-    )
-    stream.log(path, mesh, static=True)
+    return constants(rr.LineStrips3D.from_fields(colors=color, radii=rr.Radius.ui_points(width)))
 
 
-def _only(archetype: Any, **fields: Any) -> Any:
-    return archetype.from_fields(**fields)
+@functools.cache
+def _beam() -> tuple[Column, ...]:
+    """Return how the line to a closest point and the point are drawn; where they are follows."""
+    import rerun as rr
+
+    points = rr.Points3D.from_fields(colors=BEAM, radii=rr.Radius.ui_points(5.0))
+    return *_pen(BEAM, 2.0), *constants(points)
+
+
+@functools.cache
+def _curve(color: tuple[int, int, int]) -> tuple[Column, ...]:
+    import rerun as rr
+
+    return constants(rr.SeriesLines.from_fields(widths=1.5, colors=color))
+
+
+@functools.cache
+def _axes() -> tuple[Column, ...]:
+    import rerun as rr
+
+    return constants(rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
 
 def _document(scene: SceneView) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 
-from replay.logs.wire import shape_of
+from replay.logs.wire import MessageShape, shape_of
 from replay.recording import messages
 from replay.recording.scene_view import BodyView, Floats, Integers, SceneView
 
@@ -34,10 +35,8 @@ def _add(update: Any, body: BodyView, link: str, vertices: Floats, index: Intege
 
 def _points(mesh: Any, vertices: Floats) -> bytes:
     """Return the encoding of a mesh that has nothing but points: fields of merged messages are joined."""
-    example = type(mesh)(points=[{"x": 1.0, "y": 1.0, "z": 1.0}])
-    shape = shape_of(example.points[0].DESCRIPTOR, example.points[0].SerializeToString())
-    assert shape is not None
-    head = example.SerializeToString()[: -shape.length]
+    kind: Any = type(mesh)
+    head, shape = _point(kind)
     rows = np.empty((len(vertices), len(head) + shape.length), dtype=np.uint8)
     rows[:, : len(head)] = np.frombuffer(head, dtype=np.uint8)
     points = rows[:, len(head) :]
@@ -45,3 +44,12 @@ def _points(mesh: Any, vertices: Floats) -> bytes:
     for axis, letter in enumerate("xyz"):
         shape.slots[letter].write(points, vertices[:, axis])
     return rows.tobytes()
+
+
+@functools.cache
+def _point(mesh: Any) -> tuple[bytes, MessageShape]:
+    """Return what begins each point in the encoding of a mesh, and the shape of the point itself."""
+    example = mesh(points=[{"x": 1.0, "y": 1.0, "z": 1.0}])
+    shape = shape_of(example.points[0].DESCRIPTOR, example.points[0].SerializeToString())
+    assert shape is not None
+    return example.SerializeToString()[: -shape.length], shape

@@ -9,7 +9,7 @@ from replay.recording.scene_view import ConeView, Floats, Meshes, PlateView
 
 _CREASE = 0.8
 """Cosine of the angle between two faces below which the edge between them is drawn sharp."""
-_MOST_NEIGHBOURS = 64  # faces at one vertex that are looked at; the apex of a fine cone may have more
+_MOST_NEIGHBOURS = 64  # faces at one vertex that are looked at together; the apex of a fine cone may have more
 _CONE_SEGMENTS = 24
 _ENDLESS_CONE = 2.0
 """Length [m] that a cone without a range is drawn with."""
@@ -19,28 +19,31 @@ def corner_normals(meshes: Meshes) -> Floats:
     """Return a unit normal for each corner (t, 3, 3) of meshes: smooth over curved parts, sharp at edges.
 
     A corner takes the area-weighted mean of the normals of those faces at its vertex that lie within about 37 degrees
-    of its own face. Each corner meets the others of its vertex by looking ever further along the corners sorted by
-    vertex.
+    of its own face. Vertices with equally many corners are done at once, each corner against each of its vertex.
     """
     triangles = meshes.triangles
-    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    order = np.argsort(meshes.index.ravel(), kind="stable")
-    vertex = meshes.index.ravel()[order]
-    weighted = across[order // 3]
-    face = _unit(weighted)
-    total = weighted.copy()
-    here = np.arange(len(vertex))  # corners whose vertex has another corner `step` places on
-    for step in range(1, _MOST_NEIGHBOURS):
-        here = here[: np.searchsorted(here, len(vertex) - step)]
-        here = here[vertex[here + step] == vertex[here]]
-        if not len(here):
-            break
-        near = here[np.sum(face[here + step] * face[here], axis=1) > _CREASE]
-        total[near + step] += weighted[near]
-        total[near] += weighted[near + step]
-    result = np.empty_like(total)
-    result[order] = _unit(total)
-    return result.reshape(-1, 3, 3)
+    across = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    corner = np.argsort(meshes.index.ravel(), kind="stable")  # corners, those of one vertex after another
+    count = np.bincount(meshes.index.ravel())
+    begin = np.cumsum(count) - count
+    total = across[np.arange(len(corner)) // 3]
+    face = _unit(across)
+    for degree in np.unique(count).tolist():
+        first = begin[count == degree]
+        for at in range(0, degree, _MOST_NEIGHBOURS):
+            here = corner[first[:, None] + np.arange(at, min(at + _MOST_NEIGHBOURS, degree))]
+            of = here // 3
+            own = face[of]
+            near = own @ own.swapaxes(1, 2) > _CREASE
+            near |= np.eye(here.shape[1], dtype=np.bool_)  # a face without area has no direction
+            total[here] = near.astype(np.float64) @ across[of]
+    return _unit(total).reshape(-1, 3, 3)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def cone_strips(cone: ConeView) -> list[Floats]:
@@ -48,10 +51,13 @@ def cone_strips(cone: ConeView) -> list[Floats]:
     length = cone.range if np.isfinite(cone.range) else _ENDLESS_CONE
     half = min(0.5 * cone.aperture, 0.49 * np.pi)
     turn = np.linspace(0.0, 2.0 * np.pi, _CONE_SEGMENTS + 1)
-    rim = np.stack([np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half))], axis=1)
-    sides = [np.stack([np.zeros(3), length * rim[k]]) for k in range(0, _CONE_SEGMENTS, _CONE_SEGMENTS // 8)]
-    rings = [length * rim] if np.isfinite(cone.range) else []
-    return [transforms.apply(cone.T_link_sensor, strip) for strip in (*sides, *rings)]
+    ring = np.stack(
+        [np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half))], axis=1
+    )
+    corners = transforms.apply(cone.T_link_sensor, np.concatenate([np.zeros((1, 3)), length * ring]))
+    apex, rim = corners[0], corners[1:]
+    sides = [np.stack([apex, rim[k]]) for k in range(0, _CONE_SEGMENTS, _CONE_SEGMENTS // 8)]
+    return [*sides, rim] if np.isfinite(cone.range) else sides
 
 
 def plate_corners(plate: PlateView) -> Floats:

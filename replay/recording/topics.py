@@ -6,6 +6,7 @@ library with a value other than zero in every field, and then filled for whole b
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +14,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from replay.logs.mcap_writer import MessageRows
-from replay.logs.wire import MessageShape, shape_of
-from replay.numerics import transforms
+from replay.logs.wire import MessageShape, Slot, shape_of
 from replay.recording import messages
 from replay.simulation import FrameBlock, Layout
 
@@ -54,9 +54,16 @@ class FrameTopic:
         """Return the block's messages as records of an MCAP channel."""
         rows = MessageRows(channel, block.time, block.first, self.shape.length)
         self.shape.fill(rows.data)
+        written: dict[int, Slot] = {}
         for path, values in self.columns(block).items():
-            if path in self.shape.slots:  # an array without elements has none
-                self.shape.slots[path].write(rows.data, values)
+            slot = self.shape.slots.get(path)
+            if slot is None:  # an array without elements
+                continue
+            same = written.setdefault(id(values), slot)  # one time stamp stands in many places
+            if same is not slot and same.is_like(slot):
+                slot.copy(rows.data, same)
+            else:
+                slot.write(rows.data, values)
         return rows
 
 
@@ -83,13 +90,21 @@ def frame_topics(layout: Layout, *, collision: bool, distance: bool, capacitive:
 
 def _topic(name: str, type_: str, example: Mapping[str, Any], columns: Callable[[FrameBlock], Columns]) -> FrameTopic:
     message = messages.message_class(type_)(**example)
-    shape = shape_of(message.DESCRIPTOR, message.SerializeToString(deterministic=True))
+    return FrameTopic(name, type_, _shape(type_, message.SerializeToString(deterministic=True)), columns)
+
+
+@functools.lru_cache(maxsize=64)  # sensors are alike, and so are the runs of a night
+def _shape(type_: str, example: bytes) -> MessageShape:
+    shape = shape_of(messages.message_class(type_).DESCRIPTOR, example)
     assert shape is not None, f"the example of {type_} leaves a field out"
-    return FrameTopic(name, type_, shape, columns)
+    return shape
 
 
-def _stamps(block: FrameBlock, prefix: str) -> Columns:
-    return {f"{prefix}.seconds": block.time // _SECOND, f"{prefix}.nanos": block.time % _SECOND}
+def _stamps(block: FrameBlock, *prefixes: str) -> Columns:
+    seconds, nanos = block.time // _SECOND, block.time % _SECOND
+    return {
+        f"{prefix}.{part}": values for prefix in prefixes for part, values in (("seconds", seconds), ("nanos", nanos))
+    }
 
 
 def _joints_example(layout: Layout) -> dict[str, Any]:
@@ -119,15 +134,13 @@ def _transforms_example(layout: Layout) -> dict[str, Any]:
 
 def _transforms(layout: Layout) -> Callable[[FrameBlock], Columns]:
     def columns(block: FrameBlock) -> Columns:
-        quaternions = transforms.to_quaternion(block.link_poses)
-        result: Columns = {}
-        for link in range(len(layout.links)):
-            prefix = f"transforms[{link}]"
-            result |= _stamps(block, f"{prefix}.timestamp")
+        prefixes = [f"transforms[{link}]" for link in range(len(layout.links))]
+        result = _stamps(block, *(f"{prefix}.timestamp" for prefix in prefixes))
+        for link, prefix in enumerate(prefixes):
             for axis, letter in enumerate("xyz"):
                 result[f"{prefix}.translation.{letter}"] = block.link_poses[:, link, axis, 3]
             for axis, letter in enumerate("xyzw"):
-                result[f"{prefix}.rotation.{letter}"] = quaternions[:, link, axis]
+                result[f"{prefix}.rotation.{letter}"] = block.link_quaternions[:, link, axis]
         return result
 
     return columns

@@ -68,6 +68,7 @@ class McapWriter:
         self._log: McapFileWriter | None = None
         self._event_channel = 0
         self._scene_data = b""
+        self._finished = False
 
     def prepare(self) -> None:
         """Write what does not depend on a block, and encode the scene."""
@@ -77,6 +78,13 @@ class McapWriter:
             media_type = _MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
             self._log.attachment(name, media_type, data)
         self._scene_data = scene_message(self._scene)
+        layout = self._provenance.layout
+        groups = {
+            "collision": layout.pairs,
+            "distance": layout.distance_sensors,
+            "capacitive": layout.capacitive_sensors,
+        }
+        list(frame_topics(layout, **{group: bool(names) for group, names in groups.items()}))  # shapes are found here
 
     def write(self, block: FrameBlock) -> None:
         """Append a block; the first one decides which groups of columns the recording has."""
@@ -96,11 +104,18 @@ class McapWriter:
             self._log.rows(topic.encode(block, channel))
         self._file.flush()
 
-    def close(self) -> None:
-        """Finish the recording and give the file its name; InvalidValue when no block was written."""
+    def finish(self) -> None:
+        """Write the rest, to the file that has no name yet; InvalidValue when no block was written."""
         if self._log is None or not self._topics:
             raise InvalidValue("blocks", 0, "a recording needs at least one frame")
-        self._log.finish()
+        if not self._finished:
+            self._log.finish()
+            self._file.finish()
+            self._finished = True
+
+    def commit(self) -> None:
+        """Finish the recording, unless that is done, and give the file its name; InvalidValue as of `finish`."""
+        self.finish()
         self._file.commit()
 
     def discard(self) -> None:

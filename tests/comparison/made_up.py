@@ -150,5 +150,5 @@ def write(made: Recording, path: Path, *, files: Mapping[str, bytes] = FILES, si
                 part.capacitive,
             )
         )
-    writer.close()
+    writer.commit()
     return path

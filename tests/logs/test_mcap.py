@@ -137,6 +137,8 @@ def test_a_file_gets_its_name_only_when_it_is_whole(tmp_path: Path) -> None:
     file = PartFile(path, overwrite=False)
     file.write(b"one")
     assert file.part.exists() and not path.exists()
+    file.finish()
+    assert file.part.read_bytes() == b"one" and not path.exists()
     file.commit()
     assert path.read_bytes() == b"one" and not file.part.exists()
     with pytest.raises(RecordingExistsError):

@@ -45,6 +45,20 @@ def test_filled_columns_are_what_the_library_decodes(rows: list[tuple[int, int, 
         assert shape.slots[path].read(data).astype(column.dtype).tobytes() == column.tobytes()
 
 
+def test_equal_values_are_copied_between_slots_that_are_alike() -> None:
+    shape = joints_shape()
+    data = np.empty((3, shape.length), dtype=np.uint8)
+    shape.fill(data)
+    first, second, seconds = (
+        shape.slots[name] for name in ("joints[0].position", "joints[1].position", "timestamp.seconds")
+    )
+    values = np.array([1.5, -0.0, np.inf])
+    first.write(data, values)
+    second.copy(data, first)
+    assert first.is_like(second) and not first.is_like(seconds) and not seconds.is_like(shape.slots["timestamp.nanos"])
+    assert second.read(data).tobytes() == values.tobytes()
+
+
 @given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=5), st.integers(1, 2**31 - 1))
 def test_canonical_messages_read_the_same(ranges: list[float], seconds: int) -> None:
     message = LaserScan_pb2.LaserScan(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,7 +34,7 @@ def test_the_thread_writes_the_same_bytes(tmp_path: Path) -> None:
     other = McapWriter(tmp_path / "b.mcap", synthetic.described(FRAMES), synthetic.scene(), synthetic.FILES)
     for block in synthetic.blocks(FRAMES, wild=False):
         other.write(block)
-    other.close()
+    other.commit()
     assert (tmp_path / "made_up.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
@@ -57,8 +60,11 @@ class Failing:
         if self.blocks == 3:
             raise WriteError("x.mcap", "No space left on device")
 
-    def close(self) -> None:
-        self.log.append("close")
+    def finish(self) -> None:
+        self.log.append("finish")
+
+    def commit(self) -> None:
+        self.log.append("commit")
 
     def discard(self) -> None:
         self.log.append("discard")
@@ -74,6 +80,42 @@ def test_an_error_in_the_thread_stops_the_run(tmp_path: Path) -> None:
     assert put < 20, "the run must stop soon after the disk is full"
     assert failing.blocks == 3 and failing.log == ["discard"]
     assert list(tmp_path.iterdir()) == []
+
+
+class Noting:
+    """A writer that notes what it is asked for; writing begins when something is there to wait for."""
+
+    def __init__(self, name: str, log: list[str], ready: Callable[[], bool]) -> None:
+        self.name, self.log, self.ready = name, log, ready
+
+    def __getattr__(self, task: str) -> Callable[..., None]:
+        def note(*_: object) -> None:
+            self.log.append(f"{self.name} {task}")
+            while task == "write" and not self.ready():
+                time.sleep(0.001)
+
+        return note
+
+
+@pytest.mark.parametrize("blocks", [0, 1, 2])
+def test_the_first_writer_finishes_while_the_next_has_to_write(blocks: int) -> None:
+    log: list[str] = []
+    behind = WriteBehind(
+        [Noting(name, log, lambda: behind._queue.qsize() == waiting or "a write" in log[:-1]) for name in "ab"]
+    )
+    waiting = blocks  # the other blocks, and the end
+    with behind:
+        for block in itertools.islice(synthetic.blocks(FRAMES, wild=False), blocks):
+            behind.put(block)
+    tasks = [*["write"] * blocks, "finish"]
+    expected = [
+        "a prepare",
+        "b prepare",
+        *(f"{name} {task}" for name in "ab" for task in tasks),
+        "a commit",
+        "b commit",
+    ]
+    assert log == expected
 
 
 def test_a_full_disk_removes_the_unfinished_file(tmp_path: Path) -> None:

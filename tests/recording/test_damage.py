@@ -108,7 +108,7 @@ def kill_at_random(tmp_path: Path, count: int, seed: int) -> None:
         "blocks = list(synthetic.blocks(600)); described = synthetic.described(600); print('ready', flush=True)\n"
         "w = McapWriter(Path(sys.argv[1]), described, synthetic.scene(), synthetic.FILES)\n"
         "for b in blocks: w.write(b); time.sleep(0.03)\n"
-        "w.close()\n"
+        "w.commit()\n"
     )
     rng = random.Random(seed)
     for k in range(count):

@@ -23,7 +23,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     writer = McapWriter(target, described, moving.scene(), {})
     for block in moving.blocks(FRAMES):
         writer.write(block)
-    writer.close()
+    writer.commit()
     return target
 
 

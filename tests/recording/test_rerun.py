@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 from pathlib import Path
 
@@ -12,9 +13,11 @@ from PIL import Image
 from rerun.chunk import RrdReader
 
 from replay.errors import RecordingExistsError, ViewerError
+from replay.numerics import transforms
 from replay.recording.picture import picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
-from replay.recording.scene_view import indexed
+from replay.recording.rerun_scene import extent
+from replay.recording.scene_view import BodyView, indexed
 from replay.recording.surfaces import cone_strips, corner_normals
 from tests.recording import moving
 
@@ -28,7 +31,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     writer = RerunWriter(target, moving.LAYOUT, moving.scene())
     for block in moving.blocks(FRAMES):
         writer.write(block)
-    writer.close()
+    writer.commit()
     return target
 
 
@@ -122,6 +125,41 @@ def test_normals_are_smooth_on_a_barrel_and_sharp_on_a_box() -> None:
     side = np.abs(normals[..., 1]) < 0.5
     radial = barrel[..., [0, 2]] / 0.2
     assert np.allclose(normals[side][:, [0, 2]], radial[side], atol=np.pi / 32)  # half a segment
+
+
+def test_normals_are_those_of_every_corner_against_every_other() -> None:
+    rng = np.random.default_rng(3)
+    fan = np.array(
+        [[[0, 0, 1], [np.cos(a), np.sin(a), 0], [np.cos(a + 0.2), np.sin(a + 0.2), 0]] for a in np.arange(30)]
+    )
+    triangles = np.concatenate([rng.normal(size=(20, 3))[rng.integers(0, 20, size=(80, 3))], fan, np.zeros((1, 3, 3))])
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    length = np.linalg.norm(across, axis=1)
+    face = across / np.where(length > 0, length, 1.0)[:, None]
+    expected = np.zeros_like(triangles)
+    for here in np.ndindex(triangles.shape[:2]):
+        for there in np.ndindex(triangles.shape[:2]):
+            if here == there or ((triangles[here] == triangles[there]).all() and face[here[0]] @ face[there[0]] > 0.8):
+                expected[here] += across[there[0]]
+    length = np.linalg.norm(expected, axis=2)
+    expected /= np.where(length > 0, length, 1.0)[..., None]
+    assert np.allclose(corner_normals(indexed([triangles])), expected, atol=1e-12)  # sums in another order
+
+
+def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
+    scene = moving.scene()
+    poses = next(moving.blocks(FRAMES)).link_poses[40]
+    sheet = np.array([[[-9.0, -9, 0], [9, -9, 0], [9, 9, 0]]])
+    floor = BodyView("room/floor", 1, sheet, (0, 0, 0, 255))
+    nothing = BodyView("room/nothing", 1, np.zeros((0, 3, 3)), (0, 0, 0, 255))
+    placed = [transforms.apply(poses[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies]
+    for bodies, points in (
+        ((floor, *scene.bodies, nothing), np.concatenate(placed)),
+        ((nothing, floor), sheet.reshape(-1, 3)),
+        ((nothing,), np.array([[-1.0, -1, 0], [1, 1, 1]])),
+    ):
+        shown = extent(dataclasses.replace(scene, bodies=bodies), poses)
+        assert np.allclose([shown.min(axis=0), shown.max(axis=0)], [points.min(axis=0), points.max(axis=0)])
 
 
 def test_cones_have_their_aperture_and_range() -> None:

@@ -30,7 +30,7 @@ def write(path: Path, frames: int = FRAMES, **options: bool) -> Path:
     writer = McapWriter(path, synthetic.described(frames), synthetic.scene(), synthetic.FILES, **options)
     for block in synthetic.blocks(frames):
         writer.write(block)
-    writer.close()
+    writer.commit()
     return path
 
 
@@ -169,7 +169,7 @@ def test_scenes_without_sensors_pairs_or_joints_come_back(tmp_path: Path) -> Non
     described = provenance.describe("bare", "a.yaml", {}, frames=3, layout=empty, model={})
     writer = McapWriter(tmp_path / "bare.mcap", described, synthetic.scene().__class__("", "", ("only",), ()), {})
     writer.write(bare)
-    writer.close()
+    writer.commit()
     recording = read(tmp_path / "bare.mcap")
     assert recording.joint_positions.shape == (3, 0)
     assert recording.collision is None and recording.distance is None and recording.capacitive is None
@@ -195,7 +195,7 @@ def test_what_may_not_be_written_is_refused(path: Path, tmp_path: Path) -> None:
     assert write(path, overwrite=True).read_bytes() == before
     writer = McapWriter(tmp_path / "none.mcap", synthetic.described(0), synthetic.scene(), {})
     with pytest.raises(InvalidValue):
-        writer.close()
+        writer.commit()
     writer.discard()
     assert list(tmp_path.iterdir()) == []
 

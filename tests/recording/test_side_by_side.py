@@ -18,7 +18,7 @@ def write(path: Path, frames: int) -> Path:
     writer = RerunWriter(path, moving.LAYOUT, moving.scene())
     for block in moving.blocks(frames):
         writer.write(block)
-    writer.close()
+    writer.commit()
     return path
 
 
