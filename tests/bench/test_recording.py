@@ -8,30 +8,52 @@ from replay.bench import diff, recording, shipped, start
 from replay.bench.measure import Row
 
 
-def test_recordings_read_back_whole(small, monkeypatch):
-    monkeypatch.setattr(recording, "shipped", lambda _: small.model_copy(update={"rate": 2}))
-    monkeypatch.setattr(recording, "finer", lambda scene: scene.model_copy(update={"rate": 4, "name": "finer"}))
-    names = (small.name, "finer")
-    rows = [row for scene in (recording.shipped(""), recording.finer(small)) for row in recording.on(scene, 1)]
+def test_recordings_read_back_whole(small):
+    rows = recording.on("a", small.model_copy(update={"rate": 2}), 1)
     assert [(row.case, row.method) for row in rows] == [
-        (name, method) for name in names for method in (recording.PLAIN, recording.LOG, recording.BOTH)
+        ("a", method) for method in (recording.PLAIN, recording.LOG, recording.BOTH)
     ]
     assert not any(row.failed for row in rows)
 
 
-def test_what_recording_adds_is_told_from_two_lengths():
-    def row(case, method, frames, seconds):
-        return Row(case, method, seconds / frames, seconds / frames, seconds / frames, 1, 0.0, 0, frames, failed=False)
+def row(case, method, frames, seconds, *, failed=False):
+    return Row(case, method, seconds / frames, seconds / frames, seconds / frames, 1, 0.0, 0, frames, failed=failed)
 
-    long = "a" + recording.FINER
-    rows = [
-        row("a", recording.PLAIN, 100, 0.1),
-        row("a", recording.BOTH, 100, 0.1 + 0.02 + 100 * 50e-6),
-        row(long, recording.PLAIN, 400, 0.4),
-        row(long, recording.BOTH, 400, 0.4 + 0.02 + 400 * 50e-6),
-    ]
-    cost = recording.cost({(one.case, one.method): one for one in rows}, "a")
-    assert list(cost.values()) == ["a", "1.250", "250.0", "100.0"]  # 20 ms once, and 50 us a frame
+
+def made_up(frames, seconds):
+    """Return what `on` measures on a scene that takes a millisecond a frame and `seconds` to record."""
+
+    def on(name, _, rounds):
+        adds = {recording.PLAIN: 0.0, recording.LOG: 0.25 * seconds, recording.BOTH: seconds}
+        return [row(name, method, frames[name], frames[name] * 1e-3 + more) for method, more in adds.items()]
+
+    return on
+
+
+def test_goals_are_those_of_the_worst_long_and_the_worst_short_scene(monkeypatch):
+    frames = {recording.GUARDED: 400, "b": 200, "c": 100, "d": 99, "e": 40}
+    monkeypatch.setattr(recording, "shipped", lambda _: None)
+    monkeypatch.setattr(recording, "on", made_up(frames, 8e-3))
+    report = recording.run(scenes=tuple(frames))
+    lines = report.grids[recording.COSTS].lines
+    assert list(lines[1].values()) == ["b", "200", "1.040", "10.0", "40.0"]
+    goals = {goal.key: (goal.measured, goal.verdict) for goal in report.goals}
+    assert goals == {
+        "recording.ratio": (1.02, "met"),
+        "recording.frame": (80.0, "met"),
+        "recording.short": (200.0, "missed"),
+    }
+
+
+def test_a_wrong_recording_is_never_a_fast_one(monkeypatch):
+    methods = (recording.PLAIN, recording.LOG, recording.BOTH)
+    monkeypatch.setattr(recording, "shipped", lambda _: None)
+    monkeypatch.setattr(recording, "on", lambda name, *_: [row(name, m, 300, 0.1, failed=m != "MCAP") for m in methods])
+    assert {goal.verdict for goal in recording.run().goals} == {"wrong"}
+
+
+def test_every_scene_of_the_benchmark_is_shipped():
+    assert not [name for name in recording.SCENES if isinstance(shipped.shipped(name), str)]
 
 
 def test_a_lost_frame_is_wrong(small, tmp_path):
@@ -45,12 +67,7 @@ def test_scenarios_that_are_not_at_hand_are_said(monkeypatch, tmp_path):
     monkeypatch.setattr(shipped, "FOLDER", tmp_path)
     report = recording.run(quick=True)
     assert all(row.rounds == 0 and "source tree" in row.note for row in report.tables[recording.TABLE])
-    assert [goal.verdict for goal in report.goals] == ["not measured", "not measured"]
-
-
-def test_finer_is_the_same_motion():
-    found = shipped.shipped("carm_clear")
-    assert recording.finer(found).frames == recording.TIMES * (found.frames - 1) + 1
+    assert [goal.verdict for goal in report.goals] == ["not measured"] * 3
 
 
 def test_diffs_are_right_and_promise_nothing_on_few_frames():
