@@ -1,4 +1,8 @@
-"""What recording costs: the same run with and without, in turn, on every kind of scene that is shipped."""
+"""What recording costs: the same run with and without, in turn, on every kind of scene that is shipped.
+
+How much of it is the rerun library's own is measured too: it is given the same chunks, ready to be sent, and nothing
+is computed.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from replay.bench.goals import Goal
 from replay.bench.measure import Check, Contender, Row, absent, compete
@@ -32,8 +37,9 @@ SCENES = (
 GUARDED = SCENES[0]
 """The scene of the goal: its capacitive sensors are the most there is to compute."""
 PLAIN, LOG, BOTH = "without recording", "MCAP", "MCAP and rerun"
+LIBRARY = "the rerun library alone"
 TABLE, COSTS = "a frame of a run", "what recording adds, opening and closing the files included"
-_BOTH = f"{BOTH}, us a frame"
+_BOTH, _LIBRARY = f"{BOTH}, us a frame", f"{LIBRARY}, us a frame"
 FEW = 100
 """Frames below which a run is all opening and closing; it has a goal of its own."""
 
@@ -67,13 +73,14 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
 def cost(rows: Sequence[Row], name: str) -> dict[str, str]:
     """Return what recording adds to a scene, from its fastest rounds."""
     times = {row.method: row for row in rows if row.case == name}
-    plain, log, both = (times[method].low for method in (PLAIN, LOG, BOTH))
+    plain, log, both, library = (times[method].low for method in (PLAIN, LOG, BOTH, LIBRARY))
     return {
         "scene": name,
         "frames": f"{times[PLAIN].queries}",
         "with over without": f"{both / plain:.3f}",
         f"{LOG}, us a frame": f"{1e6 * (log - plain):.1f}",
         _BOTH: f"{1e6 * (both - plain):.1f}",
+        _LIBRARY: f"{1e6 * library:.1f}",
     }
 
 
@@ -85,6 +92,9 @@ def on(name: str, scenario: Scenario, rounds: int) -> list[Row]:
         for method, rrd in ((LOG, False), (BOTH, True)):
             task = partial(_record, scene, Path(folder), rrd)
             contenders.append(Contender(method, task, scene.frames, lambda path: _judge(path, scene)))
+        made = _record(scene, Path(folder), True).with_suffix(".rrd")
+        ready, copy = _chunks(made), Path(folder) / "copy.rrd"
+        contenders.append(Contender(LIBRARY, partial(_send, ready, copy), scene.frames, partial(_judge_copy, ready)))
         return compete(name, contenders, rounds=rounds)
 
 
@@ -101,3 +111,31 @@ def _judge(path: Path, scene: Scene) -> Check:
     found = read(path)
     lost = scene.frames - len(found.time) + found.lost_frames
     return Check(float(lost), lost)
+
+
+def _chunks(rrd: Path) -> list[Any]:
+    from rerun.chunk import RrdReader
+
+    return list(RrdReader(str(rrd)).stream())
+
+
+def _send(chunks: list[Any], path: Path) -> Path:
+    """Write chunks that are ready to a file, as the library does it by itself."""
+    import rerun as rr
+
+    stream = rr.RecordingStream("replay-bench")
+    stream.save(path)
+    stream.send_chunks(chunks)
+    stream.flush(timeout_sec=60.0)
+    stream.disconnect()
+    return path
+
+
+def _judge_copy(chunks: list[Any], path: Path) -> Check:
+    lost = _rows(chunks) - _rows(_chunks(path))
+    return Check(float(abs(lost)), abs(lost))
+
+
+def _rows(chunks: list[Any]) -> int:
+    """Return how many rows there are, without those in which the library describes the file itself."""
+    return sum(chunk.num_rows for chunk in chunks if not chunk.entity_path.startswith("/__properties"))

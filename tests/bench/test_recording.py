@@ -11,7 +11,7 @@ from replay.bench.measure import Row
 def test_recordings_read_back_whole(small):
     rows = recording.on("a", small.model_copy(update={"rate": 2}), 1)
     assert [(row.case, row.method) for row in rows] == [
-        ("a", method) for method in (recording.PLAIN, recording.LOG, recording.BOTH)
+        ("a", method) for method in (recording.PLAIN, recording.LOG, recording.BOTH, recording.LIBRARY)
     ]
     assert not any(row.failed for row in rows)
 
@@ -25,7 +25,8 @@ def made_up(frames, seconds):
 
     def on(name, _, rounds):
         adds = {recording.PLAIN: 0.0, recording.LOG: 0.25 * seconds, recording.BOTH: seconds}
-        return [row(name, method, frames[name], frames[name] * 1e-3 + more) for method, more in adds.items()]
+        rows = [row(name, method, frames[name], frames[name] * 1e-3 + more) for method, more in adds.items()]
+        return [*rows, row(name, recording.LIBRARY, frames[name], 0.5 * seconds)]
 
     return on
 
@@ -36,7 +37,7 @@ def test_goals_are_those_of_the_worst_long_and_the_worst_short_scene(monkeypatch
     monkeypatch.setattr(recording, "on", made_up(frames, 8e-3))
     report = recording.run(scenes=tuple(frames))
     lines = report.grids[recording.COSTS].lines
-    assert list(lines[1].values()) == ["b", "200", "1.040", "10.0", "40.0"]
+    assert list(lines[1].values()) == ["b", "200", "1.040", "10.0", "40.0", "20.0"]
     goals = {goal.key: (goal.measured, goal.verdict) for goal in report.goals}
     assert goals == {
         "recording.ratio": (1.02, "met"),
@@ -46,7 +47,7 @@ def test_goals_are_those_of_the_worst_long_and_the_worst_short_scene(monkeypatch
 
 
 def test_a_wrong_recording_is_never_a_fast_one(monkeypatch):
-    methods = (recording.PLAIN, recording.LOG, recording.BOTH)
+    methods = (recording.PLAIN, recording.LOG, recording.BOTH, recording.LIBRARY)
     monkeypatch.setattr(recording, "shipped", lambda _: None)
     monkeypatch.setattr(recording, "on", lambda name, *_: [row(name, m, 300, 0.1, failed=m != "MCAP") for m in methods])
     assert {goal.verdict for goal in recording.run().goals} == {"wrong"}
