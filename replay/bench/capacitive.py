@@ -146,7 +146,7 @@ def _race(
     poses, truth = np.ascontiguousarray(poses[apart]), truth[apart]
 
     def by_tree(rtol: float) -> Answer:
-        return lambda: sum_tree(clusters, tree, poses, half, False, False, rtol, np.zeros(COUNTS, np.int64))[0][:, 0]
+        return lambda: sum_tree(clusters, poses, half, False, False, rtol, np.zeros(COUNTS, np.int64))[0][:, 0]
 
     def contender(name: str, answer: Answer, tolerance: float) -> Contender:
         return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import leaf_kernel
 
 _SERIES_SPREAD = 0.1
 """Largest (z2 - z0)/m for the series: |e| <= 0.067, so that term 13 is below 1e-16."""
@@ -29,7 +29,7 @@ _NEGLIGIBLE = 1e-100
 """z1/z2 below which 1 + 1/b is 1 and the logarithm of a quotient that may overflow is a difference."""
 
 
-@kernel
+@leaf_kernel
 def mean_inverse_linear(z0: float, z1: float, z2: float) -> float:
     """Return the mean of 1/z [1/m] over a triangle on which z >= 0 is linear with corner values z0, z1, z2 [m].
 

@@ -6,7 +6,22 @@ import pytest
 from replay.geometry.primitives import sphere
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.clusters import AREA, CENTROID, FOURTH, MEAN5, MEAN6, ODD5, SECOND, make_clusters
+from replay.sensing.capacitive.clusters import (
+    AREA,
+    CENTROID,
+    FOURTH,
+    HALF,
+    MEAN2,
+    MEAN5,
+    MEAN6,
+    MIDDLE,
+    ODD5,
+    RADIUS,
+    SECOND,
+    SIGMA,
+    SIZE,
+    make_clusters,
+)
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
@@ -51,7 +66,7 @@ def test_the_error_never_exceeds_the_tolerance(body, lowest, highest, both, faci
     exact, touching = sum_triangles(body, triangle_areas(body), T, _HALF_SIZES, both, facing, EXACT)
     finite = np.isfinite(exact)
     for rtol in (1e-1, 1e-3, 1e-6, 1e-9):
-        value, touches, bound = sum_tree(clusters, tree, T, _HALF_SIZES, both, facing, rtol, np.zeros(COUNTS, np.int64))
+        value, touches, bound = sum_tree(clusters, T, _HALF_SIZES, both, facing, rtol, np.zeros(COUNTS, np.int64))
         np.testing.assert_array_equal(np.isinf(value), ~finite)
         np.testing.assert_array_equal(touches, touching)
         expected, error = exact[finite], np.abs(value[finite] - exact[finite])
@@ -68,8 +83,8 @@ def test_moments_are_those_of_the_triangles(body):
     steps = np.array([(s, t) for s, t in steps if s + t < 1.0])
     assert len(steps) == 64
     for node in (0, 1, int(tree.second[0]), len(tree.begin) - 1):
-        corners = clusters.triangles[tree.begin[node] : tree.end[node]]
-        areas = clusters.areas[tree.begin[node] : tree.end[node]]
+        corners = clusters.parts[tree.begin[node] : tree.end[node], :9].reshape(-1, 3, 3)
+        areas = clusters.parts[tree.begin[node] : tree.end[node], SIZE]
         a, b, c = corners[:, None, 0], corners[:, None, 1], corners[:, None, 2]
         points = a + steps[None, :, :1] * (b - a) + steps[None, :, 1:] * (c - a) - clusters.nodes[node, CENTROID:3]
         weights = np.repeat(areas[:, None] / 64.0, 64, axis=1) / areas.sum()
@@ -90,7 +105,40 @@ def test_a_body_behind_the_plate_counts_on_side_both_only(body):
     tree = triangle_tree(body)
     clusters = make_clusters(body, tree)
     T = transforms.from_translation(np.array([0.0, 0.0, -2.0]))[None, None].repeat(2, axis=1)
-    front, _, _ = sum_tree(clusters, tree, T, _HALF_SIZES, False, False, 1e-6, np.zeros(COUNTS, np.int64))
-    both, _, _ = sum_tree(clusters, tree, T, _HALF_SIZES, True, False, 1e-6, np.zeros(COUNTS, np.int64))
+    front, _, _ = sum_tree(clusters, T, _HALF_SIZES, False, False, 1e-6, np.zeros(COUNTS, np.int64))
+    both, _, _ = sum_tree(clusters, T, _HALF_SIZES, True, False, 1e-6, np.zeros(COUNTS, np.int64))
     assert (front == 0.0).all()
     assert (both > 0.0).all()
+
+
+def test_outlines_are_rounded_to_the_safe_side(body):
+    tree = triangle_tree(body)
+    clusters = make_clusters(body, tree)
+    nodes, outlines = clusters.nodes, clusters.outlines.astype(float)
+    for column, size in ((RADIUS, nodes[:, RADIUS]), (MEAN2, nodes[:, MEAN2])):
+        assert (outlines[:, column] >= size).all()
+    for column in (ODD5, MEAN5, MEAN6):
+        assert (outlines[:, column] >= nodes[:, AREA] * nodes[:, column]).all()
+    assert (outlines[:, AREA] <= nodes[:, AREA]).all()
+    matrices = clusters.moments[:, [SECOND + k for k in (0, 3, 4, 3, 1, 5, 4, 5, 2)]].reshape(-1, 3, 3)
+    largest = np.sqrt(np.linalg.eigvalsh(matrices)[:, 2])
+    assert (outlines[:, SIGMA] >= largest).all()
+    assert (outlines[:, SIGMA] <= 1.02 * largest).all()
+    middle = outlines[:, CENTROID : CENTROID + 3] + outlines[:, MIDDLE : MIDDLE + 3]
+    half = outlines[:, HALF : HALF + 3] + clusters.blur
+    assert (middle - half <= tree.lower).all()
+    assert (middle + half >= tree.upper).all()
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e-10, 1e10, 1e30])
+def test_sizes_that_half_the_digits_do_not_hold_are_summed_within_the_tolerance(body, scale):
+    T = _poses(body, 6, -2.0, 0.5, seed=23)
+    T[..., :3, 3] *= scale
+    scaled = scale * body
+    exact, _ = sum_triangles(scaled, triangle_areas(scaled), T, scale * _HALF_SIZES, False, False, EXACT)
+    clusters = make_clusters(scaled, triangle_tree(scaled))
+    value, _, bound = sum_tree(clusters, T, scale * _HALF_SIZES, False, False, 1e-4, np.zeros(COUNTS, np.int64))
+    finite = np.isfinite(exact)
+    assert finite.sum() >= 6
+    assert (np.abs(value[finite] - exact[finite]) <= bound[finite] + 1e-13 * exact[finite]).all()
+    assert (bound[finite] <= 1e-4 * exact[finite] * (1.0 + 1e-4)).all()

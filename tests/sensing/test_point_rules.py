@@ -77,7 +77,8 @@ def test_a_part_above_the_plane_is_within_its_bound():
         radius = np.sqrt((offsets**2).sum(axis=1).max())
         if low * high >= 0.0:
             continue
-        value, bound = part_above(triangle[None], area, (offsets**2).sum() / 12.0, radius, half, half)
+        corners = [tuple(corner) for corner in triangle]
+        value, bound = part_above(*corners, area, (offsets**2).sum() / 12.0, radius, half, half)
         if np.isinf(bound):
             continue
         seen += 1

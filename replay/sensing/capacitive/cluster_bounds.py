@@ -7,25 +7,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.sensing.capacitive.clusters import (
     AREA,
     CENTROID,
     FARTHEST_PLANE,
-    LOWER,
+    HALF,
     MEAN2,
     MEAN5,
     MEAN6,
+    MIDDLE,
     NEAREST_PLANE,
     NORMAL,
     ODD5,
     OPENING,
+    OUTLINE_COLUMNS,
     RADIUS,
-    SECOND,
-    UPPER,
+    SIGMA,
 )
+from replay.sensing.capacitive.lanes import LANES, load, padded
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Singles = NDArray[np.float32]
 Triple = tuple[float, float, float]
 
 DROP, OPEN, KEEP = -1, 0, 1
@@ -34,9 +38,13 @@ DROP, OPEN, KEEP = -1, 0, 1
 CLOSEST = 1.5
 """Nodes and triangles nearer than so many of their radii are not expanded."""
 
-X, Y, Z, R, ERROR, SHIFT, LEAST = range(7)
-"""What is found of a node or triangle: centroid in the plate's frame [m], its distance [m], the error bound, what the
-expansion is corrected by, and a lower bound of the integral [m]."""
+FOUND, VERDICT = 40, 44
+ERROR, SHIFT, LEAST, REGION = range(4)
+"""What is found of a node or triangle, in the lanes from column FOUND on: the error bound, what the expansion is
+corrected by, a lower bound of the integral [m], and the region it is expanded in, see `region_of`."""
+
+_MORE, _LEAST_AREA = 1.0 + 2.0**-22, 1e-37
+"""An area in half the digits, rounded down, is less than it is by no more than these factor and sum [m^2]."""
 
 _FIFTH = (math.sqrt(7.875), math.sqrt(4.203125), 1.0)
 """Frobenius norm of the form |Pd|^5 P_5(cos) when P drops none, one or two of three components."""
@@ -53,71 +61,118 @@ def place(T: Floats, x: float, y: float, z: float) -> Triple:
 
 
 @inlined_kernel
-def judge_cluster(
-    nodes: Floats,
-    moments: Floats,
-    index: int,
+def _reaches(e: Triple, middle: Triple, half: Triple, radius: float) -> tuple[float, float]:
+    """Return how far a node reaches from its centroid along a unit vector and against it: its box, or its sphere."""
+    offset = e[0] * middle[0] + e[1] * middle[1] + e[2] * middle[2]
+    extent = abs(e[0]) * half[0] + abs(e[1]) * half[1] + abs(e[2]) * half[2]
+    return min(extent + offset, radius), min(extent - offset, radius)
+
+
+@inlined_kernel
+def region_of(x: float, y: float, half_x: float, half_y: float) -> float:
+    """Return the region of a point: 3 sx + sy, s = 1 or -1 beyond the border on that side, 0 between the borders."""
+    sx = 1.0 if x > half_x else (-1.0 if x < -half_x else 0.0)
+    return 3.0 * sx + (1.0 if y > half_y else (-1.0 if y < -half_y else 0.0))
+
+
+@inlined_kernel
+def sides_of(region: float) -> tuple[float, float]:
+    """Return sx and sy of a region."""
+    sx = 1.0 if region > 1.5 else (-1.0 if region < -1.5 else 0.0)
+    return sx, region - 3.0 * sx
+
+
+@inlined_kernel
+def _spread(sigma: float, up: float, down: float, blur: float) -> float:
+    """Return a bound of the standard deviation along an axis [m], of points of a mean that reach so far up and down."""
+    return min(sigma, math.sqrt(max((up + blur) * (down + blur), 0.0)))
+
+
+@inlined_kernel
+def _over(reach: float, gap: float, sigma: float, blur: float) -> float:
+    """Return a bound of mean(w^2) [m^2], w the depth by which a node that reaches so far lies over a border."""
+    depth = max(reach - gap, 0.0)
+    ratio = depth / reach if reach > 0.0 else 0.0
+    w = min(depth, sigma * ratio) + blur
+    return w * w if reach + blur > gap else 0.0
+
+
+@inlined_kernel
+def _over_borders(
+    position: float, half: float, up: float, down: float, sigma: float, blur: float
+) -> tuple[float, float]:
+    """Return bounds of mean(w^2) [m^2] across one axis.
+
+    First for a border that the centroid is beyond (the integral may be larger than the expansion says), then for the
+    borders that it is within (it may be smaller).
+    """
+    # as if the centroid were on the positive side
+    ahead, back = up if position >= 0.0 else down, down if position >= 0.0 else up
+    gap = half - abs(position)
+    near = _over(ahead if gap >= 0.0 else back, abs(gap), sigma, blur)
+    opposite = _over(back, half + abs(position), sigma, blur)
+    return near if gap < 0.0 else 0.0, opposite + (near if gap >= 0.0 else 0.0)
+
+
+@leaf_kernel
+def judge_nodes(
+    outlines: Singles,
+    which: Ints,
+    count: int,
     T: Floats,
     half_x: float,
     half_y: float,
     both: bool,
-    facing: bool,
-    centre: Triple,
-    found: Floats,
-) -> int:
-    """Return the verdict on a node, and if it can be kept what is found of it."""
-    a, b, c = nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2]
-    z = T[2, 0] * a + T[2, 1] * b + T[2, 2] * c + T[2, 3]
-    h, area = nodes[index, RADIUS], nodes[index, AREA]
-    if not both and z - h <= 0.0:
-        if z + h < 0.0 or z + _reach(nodes, index, T, 2, 1.0) < 0.0:
-            return DROP
-        if z - _reach(nodes, index, T, 2, -1.0) <= 0.0:
-            return OPEN
-    x = T[0, 0] * a + T[0, 1] * b + T[0, 2] * c + T[0, 3]
-    y = T[1, 0] * a + T[1, 1] * b + T[1, 2] * c + T[1, 3]
-    beyond_x, beyond_y = abs(x) - half_x, abs(y) - half_y
-    square, folded = z * z, 2
-    if beyond_x > 0.0:
-        square += beyond_x * beyond_x
-        folded -= 1
-    if beyond_y > 0.0:
-        square += beyond_y * beyond_y
-        folded -= 1
-    r = math.sqrt(square)
-    if r <= CLOSEST * h:
-        return OPEN
-    if facing:
-        verdict = _faces(nodes, index, centre)
-        if verdict != KEEP:
-            return verdict
-    inverse, nearest = 1.0 / r, 1.0 / (r - h)
-    cube = inverse * inverse * inverse
-    odd = min(_FIFTH[folded] * nodes[index, ODD5], nodes[index, MEAN5])
-    error, shift = area * cube * cube * (odd + nodes[index, MEAN6] * nearest), 0.0
-    if abs(beyond_x) < h or abs(beyond_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
-        factor = 0.25 * area * nearest * nearest * nearest
-        more_x, less_x = _border(nodes, moments, index, T, 0, x, half_x)
-        more_y, less_y = _border(nodes, moments, index, T, 1, y, half_y)
-        error += factor * (more_x + less_x + more_y + less_y)
-        shift = factor * (more_x - less_x + more_y - less_y)
-    found[X], found[Y], found[Z], found[R], found[ERROR], found[SHIFT] = x, y, z, r, error, shift
-    found[LEAST] = area / math.sqrt(square + nodes[index, MEAN2])
-    return KEEP
+    blur: float,
+    lanes: Floats,
+) -> None:
+    """Write what is found of the nodes which[:count], and the verdict on each, to the lanes.
+
+    Places may be off by `blur` [m]; the distance that is computed with is a lower bound.
+    """
+    load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
+    ex, ey, ez = (T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2])
+    tx, ty, tz = T[0, 3], T[1, 3], T[2, 3]
+    for i in range(padded(count)):
+        a, b, c = (
+            lanes[CENTROID * LANES + i],
+            lanes[(CENTROID + 1) * LANES + i],
+            lanes[(CENTROID + 2) * LANES + i],
+        )
+        h, area, sigma = lanes[RADIUS * LANES + i], lanes[AREA * LANES + i], lanes[SIGMA * LANES + i]
+        middle = (lanes[MIDDLE * LANES + i], lanes[(MIDDLE + 1) * LANES + i], lanes[(MIDDLE + 2) * LANES + i])
+        half = (lanes[HALF * LANES + i], lanes[(HALF + 1) * LANES + i], lanes[(HALF + 2) * LANES + i])
+        x = ex[0] * a + ex[1] * b + ex[2] * c + tx
+        y = ey[0] * a + ey[1] * b + ey[2] * c + ty
+        z = ez[0] * a + ez[1] * b + ez[2] * c + tz
+        above, below = _reaches(ez, middle, half, h)
+        beyond_x, beyond_y = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+        r = math.sqrt(beyond_x * beyond_x + beyond_y * beyond_y + z * z) - blur
+        verdict = 1.0 if r > CLOSEST * h else 0.0
+        verdict = 0.0 if not both and z - below <= blur else verdict
+        verdict = -1.0 if not both and z + above < -blur else verdict
+        inverse, nearest = 1.0 / r, 1.0 / (r - h)
+        cube = inverse * inverse * inverse
+        fifth = _FIFTH[0] if beyond_x > 0.0 else _FIFTH[1]
+        fifth = fifth if beyond_y > 0.0 else (_FIFTH[1] if beyond_x > 0.0 else _FIFTH[2])
+        odd = min(fifth * lanes[ODD5 * LANES + i], lanes[MEAN5 * LANES + i])
+        error = cube * cube * (odd + lanes[MEAN6 * LANES + i] * nearest)
+        up, down = _reaches(ex, middle, half, h)
+        more_x, less_x = _over_borders(x, half_x, up, down, _spread(sigma, up, down, blur), blur)
+        up, down = _reaches(ey, middle, half, h)
+        more_y, less_y = _over_borders(y, half_y, up, down, _spread(sigma, up, down, blur), blur)
+        factor = 0.25 * (area * _MORE + _LEAST_AREA) * nearest * nearest * nearest
+        # 1/sqrt(1 + t) >= 1 - t/2, and r may be short by 2 blur
+        part = 1.0 - inverse * (2.0 * blur + 0.5 * lanes[MEAN2 * LANES + i] * inverse)
+        lanes[(FOUND + ERROR) * LANES + i] = error + factor * (more_x + less_x + more_y + less_y)
+        lanes[(FOUND + SHIFT) * LANES + i] = factor * (more_x - less_x + more_y - less_y)
+        lanes[(FOUND + LEAST) * LANES + i] = max(area * inverse * part, 0.0)
+        lanes[(FOUND + REGION) * LANES + i] = region_of(x, y, half_x, half_y)
+        lanes[VERDICT * LANES + i] = verdict
 
 
 @inlined_kernel
-def _reach(nodes: Floats, index: int, T: Floats, axis: int, sign: float) -> float:
-    """Return how far the node's box reaches from its centroid along a plate axis, sign +1 or -1."""
-    reach = 0.0
-    for k in range(3):
-        e = sign * T[axis, k]
-        reach += e * (nodes[index, UPPER + k] if e > 0.0 else nodes[index, LOWER + k])
-    return min(reach, nodes[index, RADIUS])  # type: ignore[no-any-return]
-
-
-@inlined_kernel
-def _faces(nodes: Floats, index: int, centre: Triple) -> int:
+def faces(nodes: Floats, index: int, centre: Triple) -> int:
     """Return KEEP when all triangles of the node face the plate's centre, DROP when none does, OPEN otherwise.
 
     With v from the centroid to the centre, a triangle of normal n faces it if n.v exceeds the offset of its plane. The
@@ -141,36 +196,3 @@ def _faces(nodes: Floats, index: int, centre: Triple) -> int:
     # inside the cone, some normal may point straight at the centre
     largest = along * opening + across * sine if along < opening * math.sqrt(square) else math.sqrt(square)
     return DROP if largest < nodes[index, NEAREST_PLANE] - margin else OPEN
-
-
-@inlined_kernel
-def _border(
-    nodes: Floats, moments: Floats, index: int, T: Floats, axis: int, position: float, half: float
-) -> tuple[float, float]:
-    """Return bounds of mean(w^2) [m^2], w the depth by which the node lies over a border across one axis.
-
-    First for a border that the centroid is beyond (the integral may be larger than the expansion says), then for the
-    borders that it is within (it may be smaller).
-    """
-    more, less = 0.0, 0.0
-    for side in range(2):
-        sign = 1.0 - 2.0 * side
-        gap = half - sign * position
-        reach = _reach(nodes, index, T, axis, sign if gap >= 0.0 else -sign)
-        over = reach - abs(gap)
-        if over > 0.0:
-            a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
-            variance = (
-                a * a * moments[index, SECOND] + b * b * moments[index, SECOND + 1] + c * c * moments[index, SECOND + 2]
-            )
-            variance += 2.0 * (
-                a * b * moments[index, SECOND + 3]
-                + a * c * moments[index, SECOND + 4]
-                + b * c * moments[index, SECOND + 5]
-            )
-            square = min(over * over, max(variance, 0.0) * (over / reach) ** 2)
-            if gap >= 0.0:
-                less += square
-            else:
-                more += square
-    return more, less

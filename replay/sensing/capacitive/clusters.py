@@ -6,7 +6,7 @@ Computed once per body, in its own frame, from the leaves to the root.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,29 @@ from replay.sensing.capacitive.triangle_sum import triangle_areas
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Singles = NDArray[np.float32]
 
-CENTROID, RADIUS, AREA, MEAN2, MEAN5, MEAN6, ODD5 = 0, 3, 4, 5, 6, 7, 8
-LOWER, UPPER, NORMAL, OPENING, NEAREST_PLANE, FARTHEST_PLANE = 9, 12, 15, 18, 19, 20
-"""Columns of `Clusters.nodes`; CENTROID, LOWER, UPPER and NORMAL are the first of three."""
+CENTROID, RADIUS, AREA, ODD5, MEAN5, MEAN6, MEAN2 = 0, 3, 4, 5, 6, 7, 8
+NORMAL, OPENING, NEAREST_PLANE, FARTHEST_PLANE = 9, 12, 13, 14
+"""Columns of `Clusters.nodes`; CENTROID and NORMAL are the first of three. Those up to MEAN2 are in `outlines`, too."""
 
-PLACE, REACH, SPREAD, OUTWARD = 0, 3, 4, 5
-"""Columns of `Clusters.parts`; PLACE and OUTWARD are the first of three."""
+MIDDLE, HALF, SIGMA = 9, 12, 15
+"""More columns of `Clusters.outlines`; MIDDLE and HALF are the first of three."""
 
-SECOND, THIRD, FOURTH = 0, 6, 16
-"""First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4."""
+SECOND_CHILD, BEGIN, END = range(3)
+"""Columns of `Clusters.links`."""
+
+CORNERS, REACH, SPREAD, SIZE = 0, 9, 10, 11
+"""Columns of `Clusters.parts`; CORNERS is the first of nine."""
+
+SECOND, THIRD, FOURTH, WHOLE, PLACE, NUMBER = 0, 6, 16, 31, 32, 35
+"""First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4; the area,
+the centroid and the number of triangles."""
+
+OUTLINE_COLUMNS, PART_COLUMNS, MOMENT_COLUMNS = 16, 16, 40
+
+_LINE = 64
+"""[bytes] what a processor reads of its memory at a time; rows begin on such a line."""
 
 _TERMS = (
     "xx yy zz xy xz yz "
@@ -42,46 +55,98 @@ class Clusters(NamedTuple):
     """m tree nodes over n triangles, in the body's frame; one row per node keeps what a visit reads together.
 
     A node's row holds its centroid [m]; its radius [m], the largest distance of a corner from the centroid; its area
-    [m^2]; with d from the centroid, the means over the area of |d|^2, |d|^5 (an upper bound) and |d|^6; the Frobenius
-    norm of the mean of d d d d d; its box, relative to the centroid [m]; the axis of a cone around its outward normals
-    and the cosine of that cone's half angle (-1: anything may point anywhere); the least and the largest offset of its
-    triangles' planes from the centroid, along their own normals [m].
-    A triangle's row in `parts` holds its centroid [m], the largest distance of a corner from it [m], the mean of |d|^2
-    [m^2] and its outward normal, as long as twice the area [m^2]. Triangles are listed in the order of the tree, so
-    that a node's triangles are neighbours.
+    [m^2]; with d from the centroid, the Frobenius norm of the mean of d d d d d and the means over the area of |d|^5
+    (an upper bound), |d|^6 and |d|^2; the axis of a cone around its outward normals and the cosine of that cone's half
+    angle (-1: anything may point anywhere); the least and the largest offset of its triangles' planes from the
+    centroid, along their own normals [m].
+    Its outline is what its bounds need, in half the digits: as above, but with ODD5, MEAN5 and MEAN6 times the area;
+    the middle of its box, relative to the centroid, half the box's edges, and the largest standard deviation of its
+    points in any direction [m]. The area is rounded down and all other sizes are rounded up; places are as near as can
+    be, within `blur`.
+    A triangle's row in `parts` holds its corners [m], the largest distance of a corner from the centroid [m], the mean
+    of |d|^2 [m^2] and the area [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are
+    neighbours.
     """
 
-    triangles: Floats  # (n, 3, 3) [m]
-    areas: Floats  # (n,) [m^2]
-    parts: Floats  # (n, 8)
-    nodes: Floats  # (m, 24)
-    widest: int  # most triangles of a leaf
-    moments: Floats  # (m, 32) [m^2, m^3, m^4], means over the area about the centroid
+    parts: Floats  # (n, 16)
+    nodes: Floats  # (m, 16)
+    outlines: Singles  # (m, 16)
+    blur: float  # [m]
+    moments: Floats  # (m, 40) [m^2, m^3, m^4], means over the area about the centroid
+    links: Ints  # (m, 4) of the tree: second child, or -1, first triangle and one beyond the last
 
 
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
-    """Return the clusters of triangles (n, 3, 3) [m] under their tree; their size must be from 1e-45 to 1e45 m."""
+    """Return the clusters of triangles (n, 3, 3) [m] under their tree; their size must be from 1e-30 to 1e30 m.
+
+    It should be of the order of 1: far from it, half the digits do not hold the bounds, and no cluster is kept.
+    """
     ordered = np.ascontiguousarray(triangles[tree.order], dtype=np.float64)
     areas = triangle_areas(ordered)
-    offsets = ordered - ordered.mean(axis=1)[:, None]
-    squares = np.sum(offsets**2, axis=2)
-    outward = np.cross(ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0])
-    columns = [ordered.mean(axis=1), np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0, outward]
-    parts = np.ascontiguousarray(np.column_stack(columns))
-    nodes, moments = np.zeros((len(tree.begin), 24)), np.zeros((len(tree.begin), 32))
-    _gather(ordered, areas, parts, tree.second, tree.begin, tree.end, nodes, moments)
+    centroids = ordered.mean(axis=1)
+    squares = np.sum((ordered - centroids[:, None]) ** 2, axis=2)
+    parts = _rows(len(ordered), PART_COLUMNS, np.float64)
+    parts[:, :REACH] = ordered.reshape(-1, 9)
+    parts[:, REACH], parts[:, SPREAD] = np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0
+    parts[:, SIZE] = areas
+    count = len(tree.begin)
+    nodes, moments = np.zeros((count, 16)), _rows(count, MOMENT_COLUMNS, np.float64)
+    _gather(ordered, areas, centroids, tree.second, tree.begin, tree.end, nodes, moments)
     _enclose(ordered, areas, tree.begin, tree.end, nodes)
-    nodes[:, LOWER:UPPER] = tree.lower - nodes[:, CENTROID:RADIUS]
-    nodes[:, UPPER:NORMAL] = tree.upper - nodes[:, CENTROID:RADIUS]
-    widest = int(np.max((tree.end - tree.begin)[tree.second < 0]))
-    return Clusters(ordered, areas, parts, nodes, widest, moments)
+    moments[:, WHOLE], moments[:, PLACE : PLACE + 3] = nodes[:, AREA], nodes[:, CENTROID:RADIUS]
+    moments[:, NUMBER] = tree.end - tree.begin
+    links = np.ascontiguousarray(np.stack([tree.second, tree.begin, tree.end, tree.end], axis=1))
+    with np.errstate(over="ignore", under="ignore"):
+        outlines = _outlines(tree, nodes, moments)
+    # a place is off by half a bit in 24, a box relative to it as well and twice as large, in three directions
+    blur = 2.0**-21 * float(np.max(np.abs(ordered), initial=0.0))
+    return Clusters(parts, nodes, outlines, blur, moments, links)
+
+
+def _rows(count: int, columns: int, kind: type) -> Any:
+    """Return zeros (count, columns) whose rows begin on a line of memory."""
+    size = np.dtype(kind).itemsize
+    spare: Any = np.zeros(count * columns + _LINE // size, kind)
+    first = -(spare.ctypes.data // size) % (_LINE // size)
+    return spare[first : first + count * columns].reshape(count, columns)
+
+
+def _outlines(tree: Tree, nodes: Floats, moments: Floats) -> Singles:
+    area = nodes[:, AREA]
+    sizes = np.zeros((len(nodes), OUTLINE_COLUMNS))
+    sizes[:, RADIUS], sizes[:, MEAN2] = nodes[:, RADIUS], nodes[:, MEAN2]
+    for column in (ODD5, MEAN5, MEAN6):
+        sizes[:, column] = area * nodes[:, column]
+    sizes[:, HALF:SIGMA] = 0.5 * tree.upper - 0.5 * tree.lower
+    sizes[:, SIGMA] = np.sqrt(_largest_variance(moments[:, SECOND:THIRD]))
+    result: Singles = _rows(len(nodes), OUTLINE_COLUMNS, np.float32)
+    result[:] = sizes
+    result[:] = np.where(result < sizes, np.nextafter(result, np.float32(np.inf)), result)
+    result[:, CENTROID:RADIUS] = nodes[:, CENTROID:RADIUS]
+    result[:, MIDDLE:HALF] = 0.5 * tree.lower + 0.5 * tree.upper - nodes[:, CENTROID:RADIUS]
+    result[:, AREA] = area
+    result[:, AREA] = np.where(result[:, AREA] > area, np.nextafter(result[:, AREA], np.float32(0.0)), result[:, AREA])
+    return result
+
+
+def _largest_variance(second: Floats) -> Floats:
+    """Return upper bounds of the largest eigenvalues of matrices given as xx, yy, zz, xy, xz, yz, 2 % above at most.
+
+    The Frobenius norm of the 32nd power is at most 3^(1/2) times the 32nd power of the largest eigenvalue.
+    """
+    trace = second[:, 0] + second[:, 1] + second[:, 2]
+    matrix = second[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3) / np.where(trace > 0.0, trace, 1.0)[:, None, None]
+    for _ in range(5):
+        matrix = np.einsum("nij,njk->nik", matrix, matrix)
+    result: Floats = trace * np.sqrt(np.sum(matrix**2, axis=(1, 2))) ** (1.0 / 32.0) * (1.0 + 1e-12)
+    return result
 
 
 @kernel
 def _gather(
     triangles: Floats,
     areas: Floats,
-    parts: Floats,
+    centroids: Floats,
     second: Ints,
     begin: Ints,
     end: Ints,
@@ -102,7 +167,7 @@ def _gather(
                 # a body without area still has a place
                 weight = areas[k] / node[AREA] if node[AREA] > 0.0 else 1.0 / (end[index] - begin[index])
                 for axis in range(3):
-                    node[axis] += weight * parts[k, axis]
+                    node[axis] += weight * centroids[k, axis]
             for k in range(begin[index], end[index]):
                 if areas[k] > 0.0:
                     add_triangle_moments(triangles[k], areas[k], node, cube)

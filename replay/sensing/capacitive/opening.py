@@ -2,44 +2,60 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.tree import Tree
-from replay.numerics.jit import leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import ERROR, KEEP, LEAST, OPEN, Triple, judge_cluster
-from replay.sensing.capacitive.clusters import Clusters
+from replay.numerics.jit import inlined_kernel, leaf_kernel
+from replay.numerics.prefetch import prefetch
+from replay.sensing.capacitive.cluster_bounds import (
+    DROP,
+    ERROR,
+    FOUND,
+    KEEP,
+    LEAST,
+    VERDICT,
+    Triple,
+    faces,
+    judge_nodes,
+)
+from replay.sensing.capacitive.clusters import BEGIN, END, SECOND_CHILD, Clusters
+from replay.sensing.capacitive.hard_triangles import Pieces
+from replay.sensing.capacitive.lanes import LANES
 from replay.sensing.capacitive.part_queue import CLUSTER, FREE, PART, RULE, Queue, pop, push
 from replay.sensing.capacitive.part_sum import doubt_and_least
-from replay.sensing.capacitive.triangle_bounds import judge_triangle
+from replay.sensing.capacitive.triangle_bounds import ALLOWED, FIRST, judge_triangles
+from replay.sensing.capacitive.triangle_bounds import RULE as RULE_FOUND
 from replay.sensing.capacitive.triangle_rules import POINTS_1
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_EFFORT_INNER, _EFFORT_LEAF, _EFFORT_RULE = 1.0, 1.7, 0.5
-"""What it costs to open a node, a leaf, or to take a triangle's next rule, one against the other."""
+_EFFORT_RULE = 0.5
+"""What it costs to take a triangle's next rule, against opening a node."""
 
 
 class Room(NamedTuple):
     """Memory of one sum, used again for the next."""
 
     queue: Queue
-    stack: Ints  # nodes to judge, and triangles, counted on from the last node
-    hard: Ints  # triangles without a rule
-    found: Floats  # (VALUES,)
-    corners: Floats  # (PIECES, 4, 3)
-    whole: Floats  # (3, 3)
+    stack: Ints  # (n,) nodes to judge
+    tasks: Ints  # (n,) triangles to judge
+    firsts: Ints  # (n,) the first rule to try on each
+    hard: Ints  # (n,) triangles without a rule
+    lists: Ints  # (RULES + 1, n) of slots of the queue
+    batch: Ints  # (LANES,)
+    lanes: Floats  # (COLUMNS x LANES,)
+    corners: Floats  # (1, 3, 3)
     scratch: Floats  # SCRATCH
-    terms: Floats  # (RULE_POINTS,)
+    pieces: Pieces
 
 
 @leaf_kernel
 def refine(
     clusters: Clusters,
-    tree: Tree,
     T: Floats,
     half_x: float,
     half_y: float,
@@ -51,88 +67,110 @@ def refine(
     limit: float,
     scale: float,
     rtol: float,
+    blur: float,
     total: float,
     least: float,
     doubt: float,
     spent: float,
-) -> tuple[int, int, float, float]:
+) -> tuple[int, int, float, float, float]:
     """Judge what is on the stack, and open the worst parts until the sum is good enough or a triangle has no rule.
 
     Returns how many triangles without a rule now are in `room.hard`, 0 when the parts are good enough; how many nodes
-    were judged; and the lower bound of the sum and the error of the parts so far [m].
+    were judged; the lower bound of the sum and the error of the parts so far; and a lower bound of what the triangles
+    without a rule bring [m].
     """
-    queue, stack, hard, found = room.queue, room.stack, room.hard, room.found
-    nodes, moments, triangles = clusters.nodes, clusters.moments, clusters.triangles
-    first_triangle = len(nodes)
-    first, allowed = POINTS_1, limit
-    count, judged = 0, 0
+    queue, stack, tasks, firsts, hard = room.queue, room.stack, room.tasks, room.firsts, room.hard
+    batch, lanes = room.batch, room.lanes
+    nodes, outlines = clusters.nodes, clusters.outlines
+    waiting, judged, allowed = 0, 0, limit
     while True:
         while size > 0:
-            size -= 1
-            task = stack[size]
-            if task < first_triangle:
-                judged += 1
-                verdict = judge_cluster(nodes, moments, task, T, half_x, half_y, both, facing, centre, found)
-                inner = tree.second[task] >= 0
-                if verdict == OPEN or (verdict == KEEP and found[ERROR] > limit):
-                    size = _put_parts(tree, task, first_triangle, stack, size)
+            count = min(size, LANES)
+            size -= count
+            judged += count
+            for i in range(count):
+                batch[i] = stack[size + i]
+            judge_nodes(outlines, batch, count, T, half_x, half_y, both, blur, lanes)
+            for i in range(count):
+                node, verdict, error = batch[i], lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
+                if verdict < 0.0:
                     continue
-                part, rule, effort = task, CLUSTER, _EFFORT_INNER if inner else _EFFORT_LEAF
-            else:
-                part, effort = task - first_triangle, _EFFORT_RULE
-                verdict, rule = judge_triangle(
-                    triangles,
-                    clusters.areas,
-                    clusters.parts,
-                    part,
-                    T,
-                    half_x,
-                    half_y,
-                    both,
-                    facing,
-                    centre,
-                    first,
-                    allowed,
-                    room.corners,
-                    found,
-                )
-                if verdict == OPEN:
-                    hard[count] = part
-                    count += 1
-            if verdict == KEEP:
-                push(queue, part, rule, found, found[ERROR] * scale / effort)
-                least += found[LEAST]
-                doubt += found[ERROR]
-        if count > 0:
-            return count, judged, least, doubt
+                keep = (verdict > 0.0) & (error <= limit)
+                if keep and facing:
+                    side = faces(nodes, node, centre)
+                    if side == DROP:
+                        continue
+                    keep = side == KEEP
+                if keep:
+                    push(queue, node, CLUSTER, lanes, i, error * scale)
+                    least += lanes[(FOUND + LEAST) * LANES + i]
+                    doubt += error
+                else:
+                    size, waiting = _put_parts(clusters, node, stack, size, tasks, firsts, waiting)
+        hard_ones, in_hard = 0, 0.0
+        for begin in range(0, waiting, LANES):
+            count = min(waiting - begin, LANES)
+            for i in range(count):
+                batch[i] = tasks[begin + i]
+                lanes[FIRST * LANES + i], lanes[ALLOWED * LANES + i] = firsts[begin + i], allowed
+            judge_triangles(clusters.parts, batch, count, T, half_x, half_y, both, facing, lanes)
+            for i in range(count):
+                verdict, error = lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
+                if verdict > 0.0:
+                    rule = int(lanes[RULE_FOUND * LANES + i])
+                    push(queue, batch[i], rule, lanes, i, error * scale / _EFFORT_RULE)
+                    least += lanes[(FOUND + LEAST) * LANES + i]
+                    doubt += error
+                elif verdict == 0.0:
+                    hard[hard_ones] = batch[i]
+                    hard_ones += 1
+                    # one that does not face the plate may be among them
+                    in_hard += 0.0 if facing else lanes[(FOUND + LEAST) * LANES + i]
+        waiting = 0
+        if hard_ones > 0:
+            return hard_ones, judged, least, doubt, in_hard
         if doubt + spent <= rtol * least:
             # once more, without the rounding of sums that went up and down
             doubt, least = doubt_and_least(queue, total - spent)
             if doubt + spent <= rtol * least:
-                return 0, judged, least, doubt
-        slot = pop(queue)
-        if slot < 0:
-            return 0, judged, least, doubt
-        part, rule = queue.labels[slot, PART], queue.labels[slot, RULE]
-        queue.labels[slot, RULE] = FREE
-        doubt -= queue.values[slot, ERROR]
-        least -= queue.values[slot, LEAST]
-        limit = queue.values[slot, ERROR]
-        first, allowed = POINTS_1, 0.5 * limit
-        if rule == CLUSTER:
-            size = _put_parts(tree, part, first_triangle, stack, 0)
-        else:
-            first = rule + 1
-            stack[0], size = first_triangle + part, 1
+                return 0, judged, least, doubt, 0.0
+        # open at least as much error as there is too much
+        excess, opened, limit = doubt + spent - rtol * least, 0.0, math.inf
+        while opened < excess:
+            slot = pop(queue)
+            if slot < 0:
+                break
+            part, rule, error = queue.labels[slot, PART], queue.labels[slot, RULE], queue.values[slot, ERROR]
+            queue.labels[slot, RULE] = FREE
+            doubt -= error
+            least -= queue.values[slot, LEAST]
+            opened += error
+            limit = min(limit, error)
+            if rule == CLUSTER:
+                size, waiting = _put_parts(clusters, part, stack, size, tasks, firsts, waiting)
+            else:
+                tasks[waiting], firsts[waiting] = part, rule + 1
+                waiting += 1
+        if size == 0 and waiting == 0:
+            return 0, judged, least, doubt, 0.0
+        allowed = 0.5 * limit
 
 
-@leaf_kernel
-def _put_parts(tree: Tree, node: int, first_triangle: int, stack: Ints, size: int) -> int:
-    """Put a node's children, or a leaf's triangles, on the stack; return its new size."""
-    if tree.second[node] >= 0:
-        stack[size], stack[size + 1] = tree.second[node], node + 1
-        return size + 2
-    for k in range(tree.begin[node], tree.end[node]):
-        stack[size] = first_triangle + k
-        size += 1
-    return size
+@inlined_kernel
+def _put_parts(
+    clusters: Clusters, node: int, stack: Ints, size: int, tasks: Ints, firsts: Ints, waiting: int
+) -> tuple[int, int]:
+    """Put a node's children on the stack, or a leaf's triangles on the list of tasks; return the new sizes."""
+    links, outlines, parts = clusters.links, clusters.outlines, clusters.parts
+    second = links[node, SECOND_CHILD]
+    if second >= 0:
+        stack[size], stack[size + 1] = second, node + 1
+        prefetch(outlines, second, 0)
+        prefetch(links, second, 0)
+        return size + 2, waiting
+    for k in range(links[node, BEGIN], links[node, END]):
+        tasks[waiting], firsts[waiting] = k, POINTS_1
+        prefetch(parts, k, 0)
+        prefetch(parts, k, 8)
+        waiting += 1
+    return size, waiting

@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel
+from replay.sensing.capacitive.cluster_bounds import FOUND
+from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.triangle_rules import NO_RULE, PART_ABOVE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -19,11 +22,12 @@ Ints = NDArray[np.int64]
 PART, RULE, NEXT = range(3)
 """Columns of `labels`: index of the node or triangle; a triangle's rule, CLUSTER or FREE; the next slot."""
 
-CLUSTER, FREE = -1, -2
+CLUSTER, FREE = NO_RULE, PART_ABOVE + 1
+RULES = FREE + 1
 
 _NONE = -1
 _USED, _HIGHEST, _UNUSED = range(3)
-VALUES, LABELS, BUCKETS = 7, 3, 256
+VALUES, LABELS, BUCKETS = 4, 3, 256
 _BUCKET_OF_ONE = 240
 _SHIFT = 51
 """A positive double shifted right by so many bits is its exponent and the first bit of its fraction."""
@@ -34,7 +38,7 @@ _ONE = int(np.float64(1.0).view(np.int64)) >> _SHIFT
 class Queue(NamedTuple):
     """Room for the parts of one sum."""
 
-    values: Floats  # (capacity, 7)
+    values: Floats  # (capacity, 4)
     labels: Ints  # (capacity, 3)
     heads: Ints  # (256,) first slot of each bucket, or -1
     state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
@@ -54,8 +58,8 @@ def slots_used(queue: Queue) -> int:
 
 
 @inlined_kernel
-def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> None:
-    """Add a part; urgency >= 0 is its error per effort, of the order of 1 at most."""
+def push(queue: Queue, part: int, rule: int, lanes: Floats, i: int, urgency: float) -> None:
+    """Add a part, found in lane i; urgency >= 0 is its error per effort, of the order of 1 at most."""
     slot = queue.state[_UNUSED]
     if slot == _NONE:
         slot = queue.state[_USED]
@@ -67,8 +71,11 @@ def push(queue: Queue, part: int, rule: int, found: Floats, urgency: float) -> N
     queue.labels[slot, PART], queue.labels[slot, RULE], queue.labels[slot, NEXT] = part, rule, queue.heads[bucket]
     queue.heads[bucket] = slot
     queue.state[_HIGHEST] = max(queue.state[_HIGHEST], bucket)
-    for k in range(VALUES):
-        queue.values[slot, k] = found[k]
+    at = np.uint64(slot)
+    queue.values[at, np.uint64(0)] = lanes[np.uint64(FOUND * LANES + i)]
+    queue.values[at, np.uint64(1)] = lanes[np.uint64((FOUND + 1) * LANES + i)]
+    queue.values[at, np.uint64(2)] = lanes[np.uint64((FOUND + 2) * LANES + i)]
+    queue.values[at, np.uint64(3)] = lanes[np.uint64((FOUND + 3) * LANES + i)]
 
 
 @inlined_kernel

@@ -1,10 +1,11 @@
 """The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
 
 The tree is opened from the root until every part, a node or a triangle, has an error bound below what is allowed. From
-then on, as long as the bounds E add up to more than rtol times a lower bound of the sum, the part with the most error
-per effort is opened: a node into its children, a triangle into a rule of more points, and at last into pieces or the
-closed form. So the result meets rtol, and the work goes where it pays; what is small or far away may be relatively
-worse. The parts are summed at the end; nothing depends on other poses.
+then on, as long as the bounds E add up to more than rtol times a lower bound of the sum, the parts with the most error
+per effort are opened, at least as much error as there is too much: a node into its children, a triangle into a rule of
+more points, and at last into pieces or the closed form. So the result meets rtol, and the work goes where it pays; what
+is small or far away may be relatively worse. The parts are summed at the end; nothing depends on other poses.
+Nodes, triangles and pieces are judged and summed many side by side, see `lanes`.
 
 Bounds. Let r be the distance components of the centroid in its region (u, v, z with the region's zeros), r its length,
 h the largest distance of a corner from the centroid, d a point's place about it, x = h/r < 2/3. Inside one region
@@ -17,15 +18,20 @@ h the largest distance of a corner from the centroid, d a point's place about it
   E = A min(c |M5|, mean |d|^5)/r^6 + A mean |d|^6/(r^6 (r - h)); c^2 = 7.875, 4.203125 or 1 as P drops 0, 1 or 2.
 - Part of it may lie over a border, by w: there 1/dist is expanded in the wrong region's form, whose squared distance is
   off by 0 to w^2, so the integral by 0 to B = A mean(w^2) / (2 (r - h)^3), of known sign: the sum is corrected by B/2,
-  and E += B/2. A point at d across the border, of at most D, lies over it by w <= d (W/D), W the largest w:
-  mean(w^2) <= min(W^2, (W/D)^2 mean(d^2)). No cluster is clipped for it. For a triangle mean(w^2) is known; it is off
-  by A mean(w^2)/2 times something between 1/(r + h)^3 and 1/(r - h)^3.
+  and E += B/2. A point at d across the border, of at most D, lies over it by w <= d (W/D), W the largest w: the root of
+  mean(w^2) is at most W and (W/D) sigma. sigma, the standard deviation across the border, is at most the largest one in
+  any direction, and at most the root of D times the reach to the other side (Bhatia and Davis 2000). No cluster is
+  clipped for it. For a triangle mean(w^2) is known; it is off by A mean(w^2)/2 times something between 1/(r + h)^3 and
+  1/(r - h)^3.
+- Clusters are judged by outlines of half the digits: a place may be off by `blur`. So r is computed at the place found
+  and made smaller by blur, w and the root of its mean square are made larger by blur, and what lies within blur of
+  z = 0 is opened. The expansion itself has all digits; it is taken in the region in which the outline was judged.
 - A triangle: 1 point, E = A spread/(r - h)^3, borders or not, as the Hessian of 1/dist is at most 2/dist^3, spread =
   mean |d|^2; 3 points of degree 2, E = c A h spread/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4 spread/(r^7 (1 -
-  x)); 16 points of degree 8, E = c A h^7 spread/(r^10 (1 - x)); c see `triangle_rules`. Where a border or z = 0 is in
-  the way, the triangle is cut; a part above z = 0 has 1 point and a bound of its own (`part_above`).
+  x)); 16 points of degree 8, E = c A h^7 spread/(r^10 (1 - x)); c see `triangle_rules`. A part above z = 0 has 1 point
+  and a bound of its own (`part_above`). What no rule fits is cut, see `hard_triangles`.
 - The mean of 1/dist is at least 1/sqrt(mean dist^2) (Jensen), and mean dist^2 <= r^2 + mean |d|^2 (what is linear in
-  d vanishes): a part brings at least A/sqrt(r^2 + mean |d|^2).
+  d vanishes): a part brings at least A/sqrt(r^2 + mean |d|^2) >= A/r (1 - mean |d|^2/(2 r^2)).
 """
 
 from __future__ import annotations
@@ -35,31 +41,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import kernel, leaf_kernel
 from replay.sensing.capacitive.cluster_bounds import place
 from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, Clusters
-from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH
+from replay.sensing.capacitive.hard_triangles import POOL, Pieces, sum_exactly, sum_hard
+from replay.sensing.capacitive.lanes import COLUMNS, LANES
 from replay.sensing.capacitive.opening import Room, refine
-from replay.sensing.capacitive.part_queue import (
-    BUCKETS,
-    CLUSTER,
-    FREE,
-    LABELS,
-    PART,
-    RULE,
-    VALUES,
-    Queue,
-    empty,
-    slots_used,
-)
+from replay.sensing.capacitive.part_queue import BUCKETS, LABELS, RULES, VALUES, Queue, empty
 from replay.sensing.capacitive.part_sum import sum_of_parts
-from replay.sensing.capacitive.saturation import saturates
-from replay.sensing.capacitive.triangle_cuts import PIECES, triangle_within
-from replay.sensing.capacitive.triangle_rules import RULE_POINTS
-from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
+from replay.sensing.capacitive.saturation import any_saturates, suspects
+from replay.sensing.capacitive.triangle_cuts import PIECE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -73,14 +66,13 @@ by one; triangles behind the plate or facing away, left out node by node, are th
 _FIRST_PARTS = 100.0
 """A part with more than this fraction of the whole error is opened before the errors are compared."""
 
-_HARD_SHARE = 1.0 / 128.0
-"""What a triangle that has no rule may take of the half of the error that all such triangles may make."""
+_ROUNDING = 1e-15
+"""Rounding of a place in the plate's frame against that of the body."""
 
 
 @kernel
 def sum_tree(
     clusters: Clusters,
-    tree: Tree,
     T_plate_body: Floats,
     half_sizes: Floats,
     both: bool,
@@ -91,7 +83,7 @@ def sum_tree(
     """Return what `sum_triangles` returns, to a relative tolerance, and the rigorous bound of the error.
 
     Args:
-        clusters, tree: of the body, in its frame.
+        clusters: of the body, in its frame.
         T_plate_body: (n, p, 4, 4); half_sizes: (p, 2) [m]; both, facing: see `CapacitiveSensor`.
         rtol: largest relative error of each of the n x p integrals.
         counts: (COUNTS,) added to.
@@ -99,7 +91,7 @@ def sum_tree(
     Returns:
         (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
     """
-    capacity = len(clusters.triangles)
+    capacity = len(clusters.parts)
     room = Room(
         Queue(
             np.empty((capacity, VALUES)),
@@ -107,13 +99,28 @@ def sum_tree(
             np.empty(BUCKETS, np.int64),
             np.empty(3, np.int64),
         ),
-        np.empty(MAX_DEPTH + clusters.widest, np.int64),
+        np.empty(capacity + LANES, np.int64),
         np.empty(capacity, np.int64),
-        np.empty(VALUES),
-        np.empty((PIECES, 4, 3)),
-        np.empty((3, 3)),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty((RULES + 1, max(capacity, RULES)), np.int64),
+        np.empty(LANES, np.int64),
+        np.zeros(COLUMNS * LANES),
+        np.empty((1, 3, 3)),
         np.empty(SCRATCH),
-        np.empty(RULE_POINTS),
+        Pieces(
+            np.empty((POOL, PIECE)),
+            np.empty((3, 2 * LANES, PIECE)),
+            np.empty(3, np.int64),
+            np.empty(LANES, np.int64),
+            np.empty(LANES),
+            np.empty(LANES),
+            np.empty(LANES),
+            np.empty(LANES, np.int64),
+            np.empty(LANES, np.int64),
+            np.empty(LANES, np.int64),
+            np.eye(4),
+        ),
     )
     n, plates = len(T_plate_body), len(half_sizes)
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
@@ -122,7 +129,7 @@ def sum_tree(
         for plate in range(plates):
             T, half_x, half_y = T_plate_body[frame, plate], half_sizes[plate, 0], half_sizes[plate, 1]
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _sum_one(
-                clusters, tree, T, half_x, half_y, both, facing, rtol, room, counts
+                clusters, T, half_x, half_y, both, facing, rtol, room, counts
             )
     return integral, touching, bound
 
@@ -130,7 +137,6 @@ def sum_tree(
 @kernel
 def _sum_one(
     clusters: Clusters,
-    tree: Tree,
     T: Floats,
     half_x: float,
     half_y: float,
@@ -141,26 +147,27 @@ def _sum_one(
     counts: Ints,
 ) -> tuple[float, bool, float]:
     queue, stack, hard = room.queue, room.stack, room.hard
-    triangles, areas, corners = clusters.triangles, clusters.areas, room.corners
+    corners = room.corners
     centre = (
         -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
         -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
     )
-    if saturates(clusters, tree, T, half_x, half_y, both, facing, stack, corners):
+    count = suspects(clusters, T, half_x, half_y, facing, stack, hard, corners)
+    if count > 0 and any_saturates(clusters.parts, hard, count, T, half_x, half_y, both, corners):
         return math.inf, True, 0.0
     empty(queue)
     ceiling = rtol * _least_of_root(clusters.nodes, T, half_x, half_y)
     scale = 1.0 / ceiling if ceiling > 0.0 else 1.0
+    blur = clusters.blur + _ROUNDING * (abs(T[0, 3]) + abs(T[1, 3]) + abs(T[2, 3]))
     stack[0] = 0
     size = 1
-    judged, whole, in_whole, alone = 0, 0, 0, 0
+    judged, alone = 0, 0
     touching = False
     total, lost, least, doubt, spent = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
-        count, opened, least, doubt = refine(
+        count, opened, least, doubt, in_hard = refine(
             clusters,
-            tree,
             T,
             half_x,
             half_y,
@@ -172,6 +179,7 @@ def _sum_one(
             ceiling / _FIRST_PARTS,
             scale,
             rtol,
+            blur,
             total,
             least,
             doubt,
@@ -181,35 +189,55 @@ def _sum_one(
         size = 0
         if count == 0:
             break
-        for k in hard[:count][::-1]:
-            alone += 1
-            into_plate(T, triangles, k, corners)
-            low = min(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
-            high = max(corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
-            touches = low <= 0.0 <= high and contact(corners[0], half_x, half_y, both) != CLEAR
-            touching = touching or touches
-            if (not both and high <= 0.0) or areas[k] <= 0.0 or (facing and not faces_centre(corners)):
-                continue
-            share = 0.0 if touches else max(0.0, _HARD_SHARE * (0.5 * rtol * least - spent))
-            value, error = triangle_within(
-                corners, areas[k], half_x, half_y, both, share, room.whole, room.scratch, room.terms
+        alone += count
+        least_then = least + in_hard
+        for begin in range(0, count, LANES):
+            several = min(count - begin, LANES)
+            # half of the error is for triangles that have no rule; these may take half of what is left of it
+            share = max(0.0, 0.5 * rtol * max(least, least_then) - spent) / (2.0 * several)
+            value, error, slow = sum_hard(
+                clusters.parts,
+                hard,
+                begin,
+                several,
+                T,
+                half_x,
+                half_y,
+                both,
+                facing,
+                share,
+                room.pieces,
+                corners,
+                room.lanes,
             )
-            if value == math.inf:
-                _add_counts(counts, judged, 0, 0, alone)
-                return math.inf, True, 0.0
+            if slow > 0:
+                exact, touches = sum_exactly(
+                    clusters.parts,
+                    room.pieces.slow,
+                    slow,
+                    T,
+                    half_x,
+                    half_y,
+                    both,
+                    facing,
+                    corners,
+                    room.scratch,
+                )
+                touching = touching or touches
+                if exact == math.inf:
+                    _add_counts(counts, judged, 0, 0, alone)
+                    return math.inf, True, 0.0
+                value += exact
             total, e = two_sum(total, value)
             lost += e
             least += value - error
             spent += error
-    for slot in range(slots_used(queue)):
-        rule, part = queue.labels[slot, RULE], queue.labels[slot, PART]
-        if rule == CLUSTER:
-            whole += 1
-            in_whole += tree.end[part] - tree.begin[part]
-        elif rule != FREE:
-            alone += 1
-    _add_counts(counts, judged, whole, in_whole, alone)
-    total, lost = sum_of_parts(clusters, queue, T, half_x, half_y, total, lost, corners, room.terms)
+    parts, lost_in_parts, whole, in_whole, others = sum_of_parts(
+        clusters, queue, T, half_x, half_y, room.lists, room.batch, room.lanes
+    )
+    _add_counts(counts, judged, whole, in_whole, alone + others)
+    total, e = two_sum(total, parts)
+    lost += lost_in_parts + e
     return total + lost, touching, doubt + spent
 
 

@@ -7,102 +7,97 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.sensing.capacitive.cluster_bounds import (
     CLOSEST,
-    DROP,
     ERROR,
-    KEEP,
+    FOUND,
     LEAST,
-    OPEN,
+    REGION,
     SHIFT,
-    R,
+    VERDICT,
     Triple,
-    X,
-    Y,
-    Z,
-    place,
+    region_of,
 )
-from replay.sensing.capacitive.clusters import OUTWARD, PLACE, REACH, SPREAD
-from replay.sensing.capacitive.triangle_rules import NO_RULE, PART_ABOVE, POINTS_1, borders, cheapest_rule, part_above
-from replay.sensing.capacitive.triangle_sum import faces_centre, into_plate
+from replay.sensing.capacitive.clusters import PART_COLUMNS, REACH, SIZE, SPREAD
+from replay.sensing.capacitive.lanes import LANES, load, padded
+from replay.sensing.capacitive.point_sums import corner_in_lanes
+from replay.sensing.capacitive.triangle_rules import (
+    NO_RULE,
+    PART_ABOVE,
+    POINTS_1,
+    cheapest_rule,
+    over_borders,
+    part_above,
+)
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+RULE, FIRST, ALLOWED = VERDICT + 1, VERDICT + 2, VERDICT + 3
+"""Columns of the lanes: the rule that is found; the first that comes into question, and the error it may make [m]."""
 
 
 @inlined_kernel
-def judge_triangle(
-    triangles: Floats,
-    areas: Floats,
+def _faces_centre(a: Triple, b: Triple, c: Triple) -> bool:
+    """Return what `faces_centre` returns, by the same operations."""
+    bx, by, bz, cx, cy, cz = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    outward = (by * cz - bz * cy) * a[0] + (bz * cx - bx * cz) * a[1] + (bx * cy - by * cx) * a[2]
+    return outward < 0.0
+
+
+@leaf_kernel
+def judge_triangles(
     parts: Floats,
-    k: int,
+    which: Ints,
+    count: int,
     T: Floats,
     half_x: float,
     half_y: float,
     both: bool,
     facing: bool,
-    centre: Triple,
-    first: int,
-    allowed: float,
-    corners: Floats,
-    found: Floats,
-) -> tuple[int, int]:
-    """Return the verdict on a triangle, and if it can be kept its cheapest rule and what is found of it.
+    lanes: Floats,
+) -> None:
+    """Write what is found of the triangles which[:count], verdict and cheapest rule to the lanes.
 
-    It can be kept if one of the rules from `first` on makes at most the allowed error [m]. A triangle that may touch
-    the plate is always OPEN. `corners` (1 or more, 3 or more, 3) is scratch memory.
+    FIRST and ALLOWED are given there. A triangle that may touch the plate is always OPEN. What one point sums is found
+    as SHIFT.
     """
-    x, y, z = place(T, parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2])
-    h = parts[k, REACH]
-    placed = False
-    if not both and z - h <= 0.0:
-        if z + h < 0.0:
-            return DROP, NO_RULE
-        into_plate(T, triangles, k, corners)
-        placed = True
-        heights = (corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2])
-        if max(heights) < 0.0:
-            return DROP, NO_RULE
-        if min(heights) <= 0.0:
-            if first != POINTS_1 or min(heights) * max(heights) == 0.0 or (facing and not faces_centre(corners)):
-                return OPEN, NO_RULE
-            value, error = part_above(corners, areas[k], parts[k, SPREAD], h, half_x, half_y)
-            found[ERROR], found[SHIFT], found[LEAST] = error, value, max(0.0, value - error)
-            return KEEP if error <= allowed else OPEN, PART_ABOVE
-    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
-    r = math.sqrt(u * u + v * v + z * z)
-    if r <= CLOSEST * h:
-        return OPEN, NO_RULE
-    if facing:
-        side = _side_of_centre(parts, k, centre)
-        if side == OPEN:
-            if not placed:
-                into_plate(T, triangles, k, corners)
-                placed = True
-            side = KEEP if faces_centre(corners) else DROP
-        if side == DROP:
-            return DROP, NO_RULE
-    area, spread = areas[k], parts[k, SPREAD]
-    shift, doubt = 0.0, 0.0
-    if abs(abs(x) - half_x) < h or abs(abs(y) - half_y) < h or abs(x) + half_x < h or abs(y) + half_y < h:
-        if not placed:
-            into_plate(T, triangles, k, corners)
-        shift, doubt, _ = borders(corners, 0, area, x, y, h, r, half_x, half_y)
-    rule, error = cheapest_rule(first, area, spread, h, r, doubt, allowed)
-    if rule == NO_RULE:
-        return OPEN, rule
-    found[X], found[Y], found[Z], found[R], found[ERROR], found[SHIFT] = x, y, z, r, error, shift
-    found[LEAST] = area / math.sqrt(r * r + spread)
-    return KEEP, rule
+    load(parts, PART_COLUMNS, which, count, lanes, 0)
+    judge_loaded(count, T, half_x, half_y, both, facing, lanes)
 
 
 @inlined_kernel
-def _side_of_centre(parts: Floats, k: int, centre: Triple) -> int:
-    """Return KEEP when a triangle faces the plate's centre, DROP when not, OPEN when `faces_centre` may round it."""
-    a, b, c = parts[k, PLACE], parts[k, PLACE + 1], parts[k, PLACE + 2]
-    nx, ny, nz = parts[k, OUTWARD], parts[k, OUTWARD + 1], parts[k, OUTWARD + 2]
-    x, y, z = centre[0] - a, centre[1] - b, centre[2] - c
-    along = nx * x + ny * y + nz * z
-    extent = abs(a) + abs(b) + abs(c) + abs(centre[0]) + abs(centre[1]) + abs(centre[2]) + parts[k, REACH]
-    margin = (1e-9 * (abs(nx) + abs(ny) + abs(nz)) + 1e-13 * parts[k, REACH] * extent) * (abs(x) + abs(y) + abs(z))
-    return KEEP if along > margin else (DROP if along < -margin else OPEN)
+def judge_loaded(count: int, T: Floats, half_x: float, half_y: float, both: bool, facing: bool, lanes: Floats) -> None:
+    """Do what `judge_triangles` does, of rows that are in the lanes."""
+    for i in range(padded(count)):
+        a, b, c = corner_in_lanes(T, lanes, 0, i), corner_in_lanes(T, lanes, 1, i), corner_in_lanes(T, lanes, 2, i)
+        h, spread, area = lanes[REACH * LANES + i], lanes[SPREAD * LANES + i], lanes[SIZE * LANES + i]
+        first, allowed = lanes[FIRST * LANES + i], lanes[ALLOWED * LANES + i]
+        low, high = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
+        x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
+        u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+        square = u * u + v * v + z * z
+        r = math.sqrt(square)
+        inverse, nearest, farthest = 1.0 / r, 1.0 / (r - h), 1.0 / (r + h)
+        most, least = nearest * nearest * nearest, farthest * farthest * farthest
+        shift_x, doubt_x = over_borders(a[0], b[0], c[0], x, half_x, most, least)
+        shift_y, doubt_y = over_borders(a[1], b[1], c[1], y, half_y, most, least)
+        rule, error = cheapest_rule(first, area, spread, h, r, area * (doubt_x + doubt_y), allowed)
+        shift = area * (shift_x + shift_y)
+        shift = area * inverse if rule == POINTS_1 else shift
+        at_least = area / math.sqrt(square + spread)
+        crossing = not both and low <= 0.0
+        value, wrong = part_above(a, b, c, area, spread, h, half_x, half_y)
+        far_enough = first == POINTS_1 and low < 0.0 < high and wrong <= allowed
+        kept = 1.0 if rule != NO_RULE and r > CLOSEST * h else 0.0
+        kept = (1.0 if far_enough else 0.0) if crossing else kept
+        # one that does not face the plate may still touch it
+        averted = facing and r > CLOSEST * h and not _faces_centre(a, b, c)
+        kept = -1.0 if averted or (not both and high < 0.0) else kept
+        lanes[(FOUND + REGION) * LANES + i] = region_of(x, y, half_x, half_y)
+        lanes[(FOUND + ERROR) * LANES + i] = wrong if crossing else error
+        lanes[(FOUND + SHIFT) * LANES + i] = value if crossing else shift
+        lanes[(FOUND + LEAST) * LANES + i] = max(0.0, value - wrong) if crossing else at_least
+        lanes[RULE * LANES + i] = PART_ABOVE if crossing else rule
+        lanes[VERDICT * LANES + i] = kept

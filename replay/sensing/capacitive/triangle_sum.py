@@ -43,6 +43,17 @@ def into_plate(T_plate_body: Floats, triangles: Floats, index: int, result: Floa
 
 
 @leaf_kernel
+def part_into_plate(T_plate_body: Floats, parts: Floats, index: int, result: Floats) -> None:
+    """Do what `into_plate` does, to the last bit, for a row of `Clusters.parts`, which begins with the corners."""
+    for k in range(3):
+        x, y, z = parts[index, 3 * k], parts[index, 3 * k + 1], parts[index, 3 * k + 2]
+        for r in range(3):
+            result[0, k, r] = (
+                T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
+            )
+
+
+@leaf_kernel
 def faces_centre(corners: Floats) -> bool:
     """Return whether the outer side of corners[0], in the plate's frame, holds the plate's centre, n.(0 - a) > 0."""
     ax, ay, az = corners[0, 0, 0], corners[0, 0, 1], corners[0, 0, 2]

@@ -1,0 +1,62 @@
+"""Many parts side by side: what is found of them is computed in loops that a compiler turns into vector instructions.
+
+`lanes` is one flat array of columns, LANES numbers each: row i of column k is at k LANES + i. A loop over i without
+branches, whose columns are at constant places of one array, is vectorised; every lane rounds as a scalar would, so that
+results do not depend on the processor's vectors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics.jit import inlined_kernel
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.floating[Any]]
+Ints = NDArray[np.int64]
+
+LANES = 64
+COLUMNS = 52
+"""Size of `lanes`: (COLUMNS x LANES,)."""
+
+
+@inlined_kernel
+def padded(count: int) -> int:
+    """Return a number of lanes >= count that vectors fill; what is in the lanes beyond count is of no use."""
+    return (count + 7) & -8
+
+
+@inlined_kernel
+def load(rows: Rows, columns: int, which: Ints, count: int, lanes: Floats, at: int) -> None:
+    """Write the first columns, in fours, of the rows which[:count] to the lanes, from column `at` on.
+
+    A loop over columns would become scattered stores, which take longer than single ones.
+    """
+    for i in range(count):
+        row = which[i]
+        _copy_four(rows, row, 0, lanes, at, i)
+        if columns > 4:
+            _copy_four(rows, row, 4, lanes, at, i)
+        if columns > 8:
+            _copy_four(rows, row, 8, lanes, at, i)
+            _copy_four(rows, row, 12, lanes, at, i)
+        if columns > 16:
+            _copy_four(rows, row, 16, lanes, at, i)
+            _copy_four(rows, row, 20, lanes, at, i)
+            _copy_four(rows, row, 24, lanes, at, i)
+            _copy_four(rows, row, 28, lanes, at, i)
+            _copy_four(rows, row, 32, lanes, at, i)
+            _copy_four(rows, row, 36, lanes, at, i)
+
+
+@inlined_kernel
+def _copy_four(rows: Rows, row: int, column: int, lanes: Floats, at: int, i: int) -> None:
+    # unsigned, as numba looks for indices below 0
+    r, c, p = np.uint64(row), np.uint64(column), np.uint64((at + column) * LANES + i)
+    lanes[p] = rows[r, c]
+    lanes[p + np.uint64(LANES)] = rows[r, c + np.uint64(1)]
+    lanes[p + np.uint64(2 * LANES)] = rows[r, c + np.uint64(2)]
+    lanes[p + np.uint64(3 * LANES)] = rows[r, c + np.uint64(3)]
