@@ -58,7 +58,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.comparison.rules_file
 	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
 
-bench: setup  ## speed against error, ours and other engines' (some ten minutes); the report is recordings/bench/bench.html
+bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
