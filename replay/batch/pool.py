@@ -195,7 +195,7 @@ class _Worker:
         self._memory = 0
         self._began = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _BEGIN, json.dumps(sys.path)],
+            [sys.executable, "-u", "-c", _BEGIN, json.dumps(sys.path)],  # what a task printed is in its log if it dies
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

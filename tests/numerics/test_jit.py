@@ -41,7 +41,7 @@ def package(tmp_path):
 
 def run(package: Path, code: str, **environment: str) -> str:
     env = {**os.environ, "PYTHONPATH": str(package.parent), **environment}
-    command = [sys.executable, "-c", PROBE + code]
+    command = [sys.executable, "-B", "-c", PROBE + code]  # Python itself goes by time and size
     done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=package.parent, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
