@@ -47,7 +47,7 @@ def run(*, quick: bool = False, rounds: int | None = None, bodies: Sequence[str]
     """Run the capacitive benchmarks.
 
     Args:
-        quick: fewer poses, and splits as far as a second allows; about a minute.
+        quick: fewer poses, and splits as far as a second allows; some ten seconds.
         rounds: times that every contender is timed; 5, or 3 when quick, if None.
         bodies: which of `BODIES`.
     """

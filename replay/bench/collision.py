@@ -36,7 +36,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
     """Run all collision benchmarks.
 
     Args:
-        quick: fewer queries and frames; about a minute.
+        quick: fewer queries and frames; some ten seconds.
         rounds: times that every contender is timed; 9, or 5 when quick, if None.
         engines: instead of ours and the peers; the first one is the one that goals are about.
     """

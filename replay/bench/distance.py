@@ -52,7 +52,7 @@ def run(*, quick: bool = False, rounds: int | None = None, meshes: Sequence[str]
     """Run the distance benchmarks.
 
     Args:
-        quick: fewer queries, and no bundle of 10 000 rays; about a minute.
+        quick: fewer queries, and no bundle of 10 000 rays; some five seconds.
         rounds: times that every contender is timed; 5, or 3 when quick, if None.
         meshes: which of `MESHES`.
     """

@@ -39,7 +39,7 @@ def run(*, quick: bool = False, patience: float = 5.0, subjects: Sequence[str] =
     """Run all hard families through all contestants.
 
     Args:
-        quick: fewer questions a family; about a minute.
+        quick: fewer questions a family; some ten seconds.
         patience: after which an answer is a hang [s].
         subjects: of "pairs", "cones", "plates" and "boxes".
     """

@@ -19,7 +19,7 @@ BENCHMARKS = (
 
 @click.command()
 @click.argument("names", nargs=-1, type=click.Choice(BENCHMARKS), metavar="[" + "|".join(BENCHMARKS) + "]...")
-@click.option("--quick", is_flag=True, help="Fewer queries and rounds: about a minute in all.")
+@click.option("--quick", is_flag=True, help="Fewer queries and rounds: a minute and a half in all.")
 @click.option(
     "-o",
     "--output",
