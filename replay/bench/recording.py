@@ -1,7 +1,7 @@
 """What recording costs: the same run with and without, in turn, on every kind of scene that is shipped.
 
-How much of it is the rerun library's own is measured too: it is given the same chunks, ready to be sent, and nothing
-is computed.
+How much of it is the rerun library's own is measured too: it is given the same chunks, of the recording and of the
+viewer's arrangement, ready to be sent, and nothing is computed.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def on(name: str, scenario: Scenario, rounds: int) -> list[Row]:
             task = partial(_record, scene, Path(folder), rrd)
             contenders.append(Contender(method, task, scene.frames, lambda path: _judge(path, scene)))
         made = _record(scene, Path(folder), True).with_suffix(".rrd")
-        ready, copy = _chunks(made), Path(folder) / "copy.rrd"
+        ready, copy = _Ready(made), Path(folder) / "copy.rrd"
         contenders.append(Contender(LIBRARY, partial(_send, ready, copy), scene.frames, partial(_judge_copy, ready)))
         return compete(name, contenders, rounds=rounds)
 
@@ -113,29 +113,43 @@ def _judge(path: Path, scene: Scene) -> Check:
     return Check(float(lost), lost)
 
 
-def _chunks(rrd: Path) -> list[Any]:
-    from rerun.chunk import RrdReader
+class _Ready:
+    """What is in an .rrd file, as chunks that are ready to be sent; to the library it is an arrangement too."""
 
-    return list(RrdReader(str(rrd)).stream())
+    def __init__(self, rrd: Path) -> None:
+        from rerun.chunk import RrdReader
+
+        reader = RrdReader(str(rrd))
+        self.recording = list(reader.stream())
+        self.arrangement = [chunk for store in reader.blueprints() for chunk in reader.stream(store=store)]
+
+    def rows(self) -> int:
+        """Return how many rows there are, without those in which the library describes the file itself."""
+        chunks = self.recording + self.arrangement
+        return sum(chunk.num_rows for chunk in chunks if not chunk.entity_path.startswith("/__properties"))
+
+    def to_blueprint(self) -> _Ready:
+        """Return this."""
+        return self
+
+    def _log_to_stream(self, stream: Any) -> None:
+        stream.send_chunks(self.arrangement)
 
 
-def _send(chunks: list[Any], path: Path) -> Path:
+def _send(ready: _Ready, path: Path) -> Path:
     """Write chunks that are ready to a file, as the library does it by itself."""
     import rerun as rr
 
+    arrangement: Any = ready
     stream = rr.RecordingStream("replay-bench")
     stream.save(path)
-    stream.send_chunks(chunks)
+    stream.send_chunks(ready.recording)
+    stream.send_blueprint(arrangement, make_active=False)
     stream.flush(timeout_sec=60.0)
     stream.disconnect()
     return path
 
 
-def _judge_copy(chunks: list[Any], path: Path) -> Check:
-    lost = _rows(chunks) - _rows(_chunks(path))
-    return Check(float(abs(lost)), abs(lost))
-
-
-def _rows(chunks: list[Any]) -> int:
-    """Return how many rows there are, without those in which the library describes the file itself."""
-    return sum(chunk.num_rows for chunk in chunks if not chunk.entity_path.startswith("/__properties"))
+def _judge_copy(ready: _Ready, path: Path) -> Check:
+    lost = abs(ready.rows() - _Ready(path).rows())
+    return Check(float(lost), lost)
