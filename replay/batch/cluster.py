@@ -34,11 +34,29 @@ class Parcel:
     files: dict[str, bytes]
 
 
+def check_address(address: str) -> None:
+    """Refuse what is no address of a scheduler; the library takes a minute and a traceback to say so.
+
+    Raises:
+        MissingPackageError: `distributed` is not installed.
+        InvalidValue: the address is none.
+    """
+    try:
+        from distributed.comm.addressing import parse_address, parse_host_port
+    except ImportError:
+        raise MissingPackageError("distributed", "--dask", "pip install 'replay[dask]'") from None
+    try:
+        parse_host_port(parse_address(address)[1])
+    except ValueError:
+        rule = "must be the scheduler's address and port, such as tcp://host:8786"
+        raise InvalidValue("dask", address, rule) from None
+
+
 class Cluster:
     """Runs tasks as `Pool` does, on the workers of a Dask scheduler.
 
     Args:
-        address: of the scheduler, such as tcp://host:8786.
+        address: of the scheduler, such as tcp://host:8786; see `check_address`.
         work: importable by name on every machine; called with a `CaseOrder`.
         timeout, memory: limits of one task, as of `Pool`.
         prepare: called before the task, in the process that runs it.
@@ -66,21 +84,11 @@ class Cluster:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
 
         Raises:
-            MissingPackageError: `distributed` is not installed.
-            InvalidValue: the address is none.
             WorkerError: the scheduler does not answer.
             NoSpaceError: the disk is too full for a file that came back.
         """
-        try:
-            from distributed import Client
-            from distributed.comm.addressing import parse_address, parse_host_port
-        except ImportError:
-            raise MissingPackageError("distributed", "--dask", "pip install 'replay[dask]'") from None
-        try:  # the library, given an address that is none, takes a minute and a traceback to say so
-            parse_host_port(parse_address(self._address)[1])
-        except ValueError:
-            rule = "must be the scheduler's address and port, such as tcp://host:8786"
-            raise InvalidValue("dask", self._address, rule) from None
+        from distributed import Client
+
         try:
             client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:

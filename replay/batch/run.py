@@ -109,10 +109,15 @@ def run_all(
     Raises:
         RecordingExistsError: a recording exists and may not be overwritten; nothing is run then.
         WriteError: the run folder cannot be written; NoSpaceError when the disk becomes full.
-        InvalidValue: the address of a Dask scheduler is none.
+        InvalidValue: the address of a Dask scheduler is none; nothing is written then.
+        MissingPackageError: a Dask cluster is asked for, and `distributed` is not installed; nothing is written then.
         WorkerError: worker processes cannot be started.
     """
     execution, watch, directory = execution or Execution(), watch or Unwatched(), Path(directory)
+    if execution.dask is not None:  # before anything is written
+        from replay.batch.cluster import check_address
+
+        check_address(execution.dask)
     started = datetime.datetime.now(datetime.UTC)
     results: dict[str, CaseResult] = {}
     if resume:

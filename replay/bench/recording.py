@@ -1,4 +1,4 @@
-"""What recording costs: the same run with and without, in turn, on every kind of scene that is shipped.
+"""What recording costs: the same run with and without, in turn, on every scene that is shipped.
 
 How much of it is the rerun library's own is measured too: it is given the same chunks, of the recording and of the
 viewer's arrangement, ready to be sent, and nothing is computed.
@@ -32,8 +32,12 @@ SCENES = (
     "carm_head_contact",
     "carm_clear",
     "experiments/inclined_plate",
+    "experiments/parallel_20cm",
+    "experiments/parallel_30cm",
+    "experiments/pivot_10cm",
+    "experiments/pivot_20cm",
 )
-"""All shipped scenes, of five experiments that differ in a distance only the first."""
+"""All shipped scenes."""
 GUARDED = SCENES[0]
 """The scene of the goal: its capacitive sensors are the most there is to compute."""
 PLAIN, LOG, BOTH = "without recording", "MCAP", "MCAP and rerun"

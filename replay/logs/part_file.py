@@ -57,7 +57,11 @@ class PartFile:
             raise write_error(self.path, error) from None
 
     def finish(self) -> None:
-        """Make the file durable, under the name that it has while it is written; nothing can be appended any more."""
+        """Make the file durable, under the name that it has while it is written; nothing can be appended any more.
+
+        Raises:
+            WriteError: it cannot be written; NoSpaceError when the disk is full.
+        """
         try:
             if not self._stream.closed:
                 self._stream.flush()

@@ -19,6 +19,7 @@ from replay.logs.part_file import write_file
 from replay.recording.blueprint import TIMELINE
 
 _STARTUP = 60.0  # [s] until the viewer must answer
+_ENDING = 10.0  # [s] until a viewer that is asked to end is killed
 _LOADING = 120.0  # [s] until the picture must have come to rest
 _TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
@@ -100,12 +101,17 @@ def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
         try:
             yield _connect(ViewerClient, f"rerun+http://127.0.0.1:{port}/proxy", process, log)
         finally:
-            process.terminate()
-            try:
-                process.wait(timeout=10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            end(process)
+
+
+def end(viewer: subprocess.Popen[bytes]) -> None:
+    """End a viewer, unless it has ended."""
+    viewer.terminate()
+    try:
+        viewer.wait(timeout=_ENDING)
+    except subprocess.TimeoutExpired:
+        viewer.kill()
+        viewer.wait()
 
 
 def _connect(client_type: Any, url: str, process: subprocess.Popen[bytes], log: IO[str]) -> Any:

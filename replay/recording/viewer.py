@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from replay.errors import ViewerError
-from replay.recording.picture import viewer_binary
+from replay.recording.picture import end, viewer_binary
 
 
 def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
@@ -51,16 +51,6 @@ def show(file: Path, *, web: bool = False) -> None:
         code = begun[0].wait()
     finally:
         for process in begun:
-            _end(process)
+            end(process)
     if code != 0:
         raise ViewerError(f"the rerun viewer failed with code {code}; without a display use --web or --screenshot")
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is None:
-        process.terminate()
-        try:
-            process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()

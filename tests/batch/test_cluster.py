@@ -140,6 +140,7 @@ def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path,
 def test_an_address_without_a_port_is_refused_at_once(tmp_path, address):
     with pytest.raises(InvalidValue, match="tcp://host:8786"):
         run_all([scenes.scene("a")], tmp_path, execution=Execution(dask=address))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(tmp_path, monkeypatch):

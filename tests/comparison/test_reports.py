@@ -1,4 +1,4 @@
-"""A difference as text, JSON, JUnit, HTML, suggested rules and a rerun overlay; and the command over them all."""
+"""A difference as text, JSON, JUnit, HTML and a rerun overlay."""
 
 import json
 from html.parser import HTMLParser
@@ -10,7 +10,6 @@ import pyarrow as pa
 import pytest
 from rerun.chunk import RrdReader
 
-from replay.cli import main
 from replay.comparison.difference import Verdict
 from replay.comparison.outputs import Outputs
 from replay.comparison.overlay import write_overlay
@@ -19,55 +18,14 @@ from replay.comparison.report_html import html
 from replay.comparison.report_junit import junit
 from replay.comparison.report_text import text
 from replay.comparison.rules import Rule, Rules, Tolerance
-from replay.comparison.rules_file import read_rules
 from replay.comparison.runs import Case, Pair, RunDifference, diff_pair, diff_runs
-from replay.comparison.suggest import MARK, round_up, suggest
 from replay.errors import InvalidValue, RecordingError, WriteError
 from tests.comparison import made_up
+from tests.comparison.changed import BASELINE, CANDIDATE, compared
 
-BASELINE = made_up.recording()
 PAIR = "arm/beam|stand/base"
 DIGEST = BASELINE.provenance.files["meshes/beam.stl"]
 HOSTILE = "<script>alert(1)</script>\x07&'\""
-
-
-def change(recording):
-    recording.collision.level[40:42, 0] = 1
-    recording.distance.distance[20, 0] = np.nan
-    recording.distance.distance[20:40, 1] += 1e-3
-    recording.joint_positions[3, 0] = np.nextafter(recording.joint_positions[3, 0], 9.0)
-    recording.link_quaternions[5:9, 0, 0] += 1e-9
-    recording.collision.evaluated[20:22, 0] = False
-    recording.collision.clearance[20:22, 0] = np.nan
-
-
-CANDIDATE = made_up.with_provenance(
-    made_up.altered(BASELINE, change),
-    libraries={**BASELINE.provenance.libraries, "numpy": "9.9"},
-    files={**BASELINE.provenance.files, "meshes/beam.stl": "f" * 64},
-)
-
-
-def compared(name="made_up", rules=None):
-    pair = Pair(BASELINE, CANDIDATE)
-    case = Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(pair, rules=rules))
-    return RunDifference("a.mcap", "b.mcap", (case,)), pair
-
-
-@pytest.fixture(scope="module")
-def folders(tmp_path_factory):
-    """Two run folders: `same` is equal, `other` differs, `gone` and `new` are in one only."""
-    root = tmp_path_factory.mktemp("runs")
-    for run, name, recording in (
-        ("a", "same", BASELINE),
-        ("b", "same", BASELINE),
-        ("a", "other", BASELINE),
-        ("b", "other", CANDIDATE),
-        ("a", "gone", BASELINE),
-        ("b", "new", BASELINE),
-    ):
-        made_up.write(recording, root / run / name / f"{name}.mcap")
-    return root
 
 
 def test_text_is_short_and_says_where_and_how_much():
@@ -219,52 +177,6 @@ def test_drawings_keep_peaks_and_gaps_of_long_signals():
     assert len(curve.seconds) == 60_000
 
 
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [
-        (1.0, "1.0e+0"),
-        (1.01, "1.1e+0"),
-        (0.0999, "1.0e-1"),
-        (5e-324, "5.0e-324"),
-        (2.775e-17, "2.8e-17"),
-        (99.1, "1.0e+2"),
-    ],
-)
-def test_tolerances_are_rounded_up_to_two_digits(value, expected):
-    assert round_up(value) == expected
-    assert float(round_up(value)) >= value
-
-
-def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
-    def calm(recording):
-        change(recording)
-        recording.distance.distance[20, 0] = BASELINE.distance.distance[20, 0]
-
-    pair = Pair(BASELINE, made_up.altered(BASELINE, calm))
-    found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=None)),))
-    path = tmp_path / "rules.yaml"
-    path.write_text(suggest(found), encoding="utf-8")
-    rules = read_rules(path)
-    assert len(rules.active) == 4  # both state signals need two frames and share a rule
-    assert all(rule.reason.startswith(MARK) for rule in rules.active)
-    assert diff_pair(pair, rules=rules).verdict is Verdict.SAME
-    for k, rule in enumerate(rules.active):
-        tolerance = rule.tolerance
-        tighter = Tolerance(abs=tolerance.abs * 0.9, frames=max(0, tolerance.frames - 1))
-        others = [*rules.active[:k], Rule(rule.signals, tighter, "tighter"), *rules.active[k + 1 :]]
-        assert diff_pair(pair, rules=Rules(tuple(others))).verdict is Verdict.DIFFERENT
-
-
-def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
-    found, _ = compared()
-    path = tmp_path / "rules.yaml"
-    path.write_text(suggest(found), encoding="utf-8")
-    comments = [line for line in path.read_text().splitlines() if line.startswith("#   ")]
-    assert [line.split(":")[0] for line in comments] == ['#   "/distance/left/distance', '#   "made_up']
-    remaining, _ = compared(rules=read_rules(path))
-    assert [item.signal.full_name for item in remaining.cases[0].difference.deciding] == ["/distance/left/distance"]
-
-
 def test_run_folders_correspond_by_scenario(folders):
     seen = []
     found = diff_runs(folders / "a", folders / "b", visit=lambda case, pair: seen.append(case.name))
@@ -298,57 +210,6 @@ def test_the_overlay_shows_both_runs_and_the_moments(folders, tmp_path):
     texts = [row[0] for row in columns["/difference/moments", "text"]]
     assert texts[0].startswith("first difference: /joint_states/position/lift")
     assert any("contact begins 2 frames later" in line for line in texts)
-
-
-@pytest.fixture
-def run(capsys, monkeypatch):
-    """Return what `replay diff` returns and writes to stdout and stderr."""
-    monkeypatch.setitem(main.COMMANDS, "diff", "")
-
-    def call(*arguments):
-        code = main.run(["diff", *map(str, arguments)])
-        return (int(code), *capsys.readouterr())
-
-    return call
-
-
-def test_the_command_says_it_by_its_exit_code(folders, tmp_path, run):
-    same = folders / "a" / "same" / "same.mcap", folders / "b" / "same" / "same.mcap"
-    other = folders / "a" / "other" / "other.mcap", folders / "b" / "other" / "other.mcap"
-    assert run(*same) == (0, "same: made_up: all 55 signals equal in 100 frames\n", "")
-    code, out, _ = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
-    assert (code, json.loads(out)["verdict"]) == (1, "different")
-    assert "contact begins" in (tmp_path / "new" / "d.html").read_text(encoding="utf-8")
-    ElementTree.fromstring((tmp_path / "d.xml").read_bytes())
-    code, out, _ = run(*other, "--suggest-rules")
-    assert (code, MARK in out) == (1, True)
-    code, out, _ = run(folders / "a", folders / "b", "-v", "--rrd", tmp_path / "overlays")
-    assert code == 1
-    assert [path.name for path in (tmp_path / "overlays").iterdir()] == ["other.rrd"]
-
-
-def test_the_command_says_what_it_cannot_read(folders, tmp_path, run):
-    good = folders / "a" / "same" / "same.mcap"
-    code, _, err = run(tmp_path / "none.mcap", good)
-    assert (code, "none.mcap: cannot be read: No such file" in err) == (2, True)
-    code, _, err = run(good, folders)
-    assert (code, "must be a file" in err) == (2, True)
-    damaged = bytearray(good.read_bytes())
-    damaged[len(damaged) // 2] ^= 1
-    (tmp_path / "damaged.mcap").write_bytes(damaged)
-    code, _, err = run(good, tmp_path / "damaged.mcap")
-    assert (code, "damaged" in err) == (2, True)
-    (tmp_path / "rules.yaml").write_text("rules_version: 1\nrules: [{signal: x}]\n")
-    code, _, err = run(good, good, "--rules", tmp_path / "rules.yaml")
-    assert (code, "rules.yaml:2:18: rules[0].signal = 'x'" in err) == (2, True)
-    assert run(good)[0] == 2
-
-
-def test_the_command_applies_rules(folders, tmp_path, run):
-    rules = tmp_path / "rules.yaml"
-    rules.write_text("rules_version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
-    assert run(folders / "a", folders / "b", "--rules", rules)[0] == 0
-    assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance")[0] == 1
 
 
 def test_a_report_that_cannot_be_written_is_an_error(tmp_path):

@@ -1,0 +1,33 @@
+"""A made-up recording and one in which a little of everything has changed."""
+
+from pathlib import Path
+
+import numpy as np
+
+from replay.comparison.runs import Case, Pair, RunDifference, diff_pair
+from tests.comparison import made_up
+
+BASELINE = made_up.recording()
+
+
+def change(recording):
+    recording.collision.level[40:42, 0] = 1
+    recording.distance.distance[20, 0] = np.nan
+    recording.distance.distance[20:40, 1] += 1e-3
+    recording.joint_positions[3, 0] = np.nextafter(recording.joint_positions[3, 0], 9.0)
+    recording.link_quaternions[5:9, 0, 0] += 1e-9
+    recording.collision.evaluated[20:22, 0] = False
+    recording.collision.clearance[20:22, 0] = np.nan
+
+
+CANDIDATE = made_up.with_provenance(
+    made_up.altered(BASELINE, change),
+    libraries={**BASELINE.provenance.libraries, "numpy": "9.9"},
+    files={**BASELINE.provenance.files, "meshes/beam.stl": "f" * 64},
+)
+
+
+def compared(name="made_up", rules=None):
+    pair = Pair(BASELINE, CANDIDATE)
+    case = Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(pair, rules=rules))
+    return RunDifference("a.mcap", "b.mcap", (case,)), pair

@@ -1,0 +1,60 @@
+"""`replay diff`: what it prints and writes, and its exit code."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+from replay.cli import main
+from replay.comparison.suggest import MARK
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Return what `replay diff` returns and writes to stdout and stderr."""
+    monkeypatch.setitem(main.COMMANDS, "diff", "")
+
+    def call(*arguments):
+        code = main.run(["diff", *map(str, arguments)])
+        return (int(code), *capsys.readouterr())
+
+    return call
+
+
+def test_the_command_says_it_by_its_exit_code(folders, tmp_path, run):
+    same = folders / "a" / "same" / "same.mcap", folders / "b" / "same" / "same.mcap"
+    other = folders / "a" / "other" / "other.mcap", folders / "b" / "other" / "other.mcap"
+    assert run(*same) == (0, "same: made_up: all 55 signals equal in 100 frames\n", "")
+    code, out, _ = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
+    assert (code, json.loads(out)["verdict"]) == (1, "different")
+    assert "contact begins" in (tmp_path / "new" / "d.html").read_text(encoding="utf-8")
+    ElementTree.fromstring((tmp_path / "d.xml").read_bytes())
+    code, out, _ = run(*other, "--suggest-rules")
+    assert (code, MARK in out) == (1, True)
+    code, out, _ = run(folders / "a", folders / "b", "-v", "--rrd", tmp_path / "overlays")
+    assert code == 1
+    assert [path.name for path in (tmp_path / "overlays").iterdir()] == ["other.rrd"]
+
+
+def test_the_command_says_what_it_cannot_read(folders, tmp_path, run):
+    good = folders / "a" / "same" / "same.mcap"
+    code, _, err = run(tmp_path / "none.mcap", good)
+    assert (code, "none.mcap: cannot be read: No such file" in err) == (2, True)
+    code, _, err = run(good, folders)
+    assert (code, "must be a file" in err) == (2, True)
+    damaged = bytearray(good.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "damaged.mcap").write_bytes(damaged)
+    code, _, err = run(good, tmp_path / "damaged.mcap")
+    assert (code, "damaged" in err) == (2, True)
+    (tmp_path / "rules.yaml").write_text("rules_version: 1\nrules: [{signal: x}]\n")
+    code, _, err = run(good, good, "--rules", tmp_path / "rules.yaml")
+    assert (code, "rules.yaml:2:18: rules[0].signal = 'x'" in err) == (2, True)
+    assert run(good)[0] == 2
+
+
+def test_the_command_applies_rules(folders, tmp_path, run):
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules_version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
+    assert run(folders / "a", folders / "b", "--rules", rules)[0] == 0
+    assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance")[0] == 1

@@ -1,0 +1,59 @@
+"""Suggested rules: the tightest tolerances that would pass, marked for a person to review."""
+
+from pathlib import Path
+
+import pytest
+
+from replay.comparison.difference import Verdict
+from replay.comparison.rules import Rule, Rules, Tolerance
+from replay.comparison.rules_file import read_rules
+from replay.comparison.runs import Case, Pair, RunDifference, diff_pair
+from replay.comparison.suggest import MARK, round_up, suggest
+from tests.comparison import made_up
+from tests.comparison.changed import BASELINE, change, compared
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (1.0, "1.0e+0"),
+        (1.01, "1.1e+0"),
+        (0.0999, "1.0e-1"),
+        (5e-324, "5.0e-324"),
+        (2.775e-17, "2.8e-17"),
+        (99.1, "1.0e+2"),
+    ],
+)
+def test_tolerances_are_rounded_up_to_two_digits(value, expected):
+    assert round_up(value) == expected
+    assert float(round_up(value)) >= value
+
+
+def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
+    def calm(recording):
+        change(recording)
+        recording.distance.distance[20, 0] = BASELINE.distance.distance[20, 0]
+
+    pair = Pair(BASELINE, made_up.altered(BASELINE, calm))
+    found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=None)),))
+    path = tmp_path / "rules.yaml"
+    path.write_text(suggest(found), encoding="utf-8")
+    rules = read_rules(path)
+    assert len(rules.active) == 4  # both state signals need two frames and share a rule
+    assert all(rule.reason.startswith(MARK) for rule in rules.active)
+    assert diff_pair(pair, rules=rules).verdict is Verdict.SAME
+    for k, rule in enumerate(rules.active):
+        tolerance = rule.tolerance
+        tighter = Tolerance(abs=tolerance.abs * 0.9, frames=max(0, tolerance.frames - 1))
+        others = [*rules.active[:k], Rule(rule.signals, tighter, "tighter"), *rules.active[k + 1 :]]
+        assert diff_pair(pair, rules=Rules(tuple(others))).verdict is Verdict.DIFFERENT
+
+
+def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
+    found, _ = compared()
+    path = tmp_path / "rules.yaml"
+    path.write_text(suggest(found), encoding="utf-8")
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#   ")]
+    assert [line.split(":")[0] for line in comments] == ['#   "/distance/left/distance', '#   "made_up']
+    remaining, _ = compared(rules=read_rules(path))
+    assert [item.signal.full_name for item in remaining.cases[0].difference.deciding] == ["/distance/left/distance"]
