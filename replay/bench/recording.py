@@ -1,12 +1,15 @@
 """What recording costs: the same run with and without, in turn, on every scene that is shipped.
 
-How much of it is the rerun library's own is measured too: it is given the same chunks, of the recording and of the
-viewer's arrangement, ready to be sent, and nothing is computed.
+Two files are opened, closed and made durable once a recording, however short it is; what a frame more costs is told
+apart from that by the same motion with several times as many frames. How much is the rerun library's own is measured
+too: it is given the same chunks, of the recording and of the viewer's arrangement, ready to be sent, nothing is
+computed, and the file is made durable. And so is what nobody can do without: files with nothing in them.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import tempfile
 from collections.abc import Sequence
 from functools import partial
@@ -17,6 +20,7 @@ from replay.bench.goals import Goal
 from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Grid, Report
 from replay.bench.shipped import shipped
+from replay.logs.part_file import write_file
 from replay.recording.reader import read
 from replay.recording.record import record_blocks
 from replay.scenario.model import Scenario
@@ -42,10 +46,13 @@ GUARDED = SCENES[0]
 """The scene of the goal: its capacitive sensors are the most there is to compute."""
 PLAIN, LOG, BOTH = "without recording", "MCAP", "MCAP and rerun"
 LIBRARY = "the rerun library alone"
-TABLE, COSTS = "a frame of a run", "what recording adds, opening and closing the files included"
-_BOTH, _LIBRARY = f"{BOTH}, us a frame", f"{LIBRARY}, us a frame"
+MORE_PLAIN, MORE_BOTH = f"{PLAIN}, more frames", f"{BOTH}, more frames"
+TABLE, COSTS, LEAST = "a frame of a run", "what recording adds", "what files with nothing in them cost"
+_ALL, _MORE, _ONCE = f"{BOTH}, us a frame", "a frame more, us", "once a recording, ms"
 FEW = 100
-"""Frames below which a run is all opening and closing; it has a goal of its own."""
+"""Frames below which a run is mostly opening and closing files."""
+MORE = 400
+"""At least so many frames does the longer run of a scene have more, at a multiple of its rate."""
 
 
 def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str] = SCENES) -> Report:
@@ -68,38 +75,70 @@ def run(*, quick: bool = False, rounds: int | None = None, scenes: Sequence[str]
     failed = any(row.failed for row in rows)
     ratio = float(costs[GUARDED]["with over without"]) if GUARDED in costs else math.nan
     report.goals.append(Goal("recording.ratio", ratio, failed))
-    for key, few in (("recording.frame", False), ("recording.short", True)):
-        adds = [float(cost[_BOTH]) for cost in costs.values() if (int(cost["frames"]) < FEW) is few]
+    more = [float(cost[_MORE]) for cost in costs.values()]
+    everything = [float(cost[_ALL]) for cost in costs.values() if int(cost["frames"]) >= FEW]
+    for key, adds in (("recording.frame", more), ("recording.all", everything)):
         report.goals.append(Goal(key, max(adds, default=math.nan), failed))
+    report.tables[LEAST] = nothing(rounds or 11)
     return report
 
 
 def cost(rows: Sequence[Row], name: str) -> dict[str, str]:
     """Return what recording adds to a scene, from its fastest rounds."""
-    times = {row.method: row for row in rows if row.case == name}
-    plain, log, both, library = (times[method].low for method in (PLAIN, LOG, BOTH, LIBRARY))
+    found = {row.method: row for row in rows if row.case == name}
+    times = {method: row.low * row.queries for method, row in found.items()}
+    frames, longer = found[PLAIN].queries, found[MORE_PLAIN].queries
+    adds = times[BOTH] - times[PLAIN]
+    more = (times[MORE_BOTH] - times[MORE_PLAIN] - adds) / (longer - frames)
     return {
         "scene": name,
-        "frames": f"{times[PLAIN].queries}",
-        "with over without": f"{both / plain:.3f}",
-        f"{LOG}, us a frame": f"{1e6 * (log - plain):.1f}",
-        _BOTH: f"{1e6 * (both - plain):.1f}",
-        _LIBRARY: f"{1e6 * library:.1f}",
+        "frames": f"{frames}",
+        "with over without": f"{times[BOTH] / times[PLAIN]:.3f}",
+        f"{LOG}, us a frame": f"{1e6 * (times[LOG] - times[PLAIN]) / frames:.1f}",
+        _ALL: f"{1e6 * adds / frames:.1f}",
+        f"{LIBRARY}, us a frame": f"{1e6 * times[LIBRARY] / frames:.1f}",
+        _MORE: f"{1e6 * more:.1f}",
+        _ONCE: f"{1e3 * (adds - more * frames):.1f}",
     }
 
 
 def on(name: str, scenario: Scenario, rounds: int) -> list[Row]:
     """Return the rows of one scenario; a recording that does not read back whole is wrong."""
     scene = build(scenario)
-    with tempfile.TemporaryDirectory() as folder:
-        contenders = [Contender(PLAIN, partial(_simulate, scene), scene.frames, lambda _: Check(0.0))]
-        for method, rrd in ((LOG, False), (BOTH, True)):
-            task = partial(_record, scene, Path(folder), rrd)
-            contenders.append(Contender(method, task, scene.frames, lambda path: _judge(path, scene)))
-        made = _record(scene, Path(folder), True).with_suffix(".rrd")
-        ready, copy = _Ready(made), Path(folder) / "copy.rrd"
-        contenders.append(Contender(LIBRARY, partial(_send, ready, copy), scene.frames, partial(_judge_copy, ready)))
+    finer = 1 + math.ceil(MORE / max(scene.frames - 1, 1))  # frames are at both ends
+    longer = build(scenario.model_copy(update={"rate": finer * scenario.rate}))
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        made = _record(scene, folder, True).with_suffix(".rrd")
+        ready, copy = _Ready(made), folder / "copy.rrd"
+        contenders = [
+            _without(PLAIN, scene),
+            _with(LOG, scene, folder, False),
+            _with(BOTH, scene, folder, True),
+            Contender(LIBRARY, partial(_send, ready, copy), scene.frames, partial(_judge_copy, ready)),
+            _without(MORE_PLAIN, longer),
+            _with(MORE_BOTH, longer, folder, True),
+        ]
         return compete(name, contenders, rounds=rounds)
+
+
+def nothing(rounds: int) -> list[Row]:
+    """Return what a file costs that has nothing in it: one of the rerun library's, and one that is made durable."""
+    with tempfile.TemporaryDirectory() as place:
+        rrd, durable = Path(place) / "nothing.rrd", Path(place) / "nothing"
+        contenders = [
+            Contender("opened and closed by the rerun library", partial(_open_and_close, rrd), 1, _judge_there),
+            Contender("made durable, with its name", partial(write_file, durable, b""), 1, _judge_there),
+        ]
+        return compete("a file", contenders, rounds=rounds)
+
+
+def _without(method: str, scene: Scene) -> Contender:
+    return Contender(method, partial(_simulate, scene), scene.frames, lambda _: Check(0.0))
+
+
+def _with(method: str, scene: Scene, folder: Path, rrd: bool) -> Contender:
+    return Contender(method, partial(_record, scene, folder, rrd), scene.frames, lambda path: _judge(path, scene))
 
 
 def _simulate(scene: Scene) -> None:
@@ -140,8 +179,23 @@ class _Ready:
         stream.send_chunks(self.arrangement)
 
 
+def _open_and_close(path: Path) -> Path:
+    import rerun as rr
+
+    stream = rr.RecordingStream("replay-bench")
+    stream.save(path)
+    stream.flush(timeout_sec=60.0)
+    stream.disconnect()
+    return path
+
+
+def _judge_there(path: Path) -> Check:
+    lost = int(not path.is_file())
+    return Check(float(lost), lost)
+
+
 def _send(ready: _Ready, path: Path) -> Path:
-    """Write chunks that are ready to a file, as the library does it by itself."""
+    """Write chunks that are ready to a file, as the library does it by itself, and make the file durable."""
     import rerun as rr
 
     arrangement: Any = ready
@@ -151,6 +205,8 @@ def _send(ready: _Ready, path: Path) -> Path:
     stream.send_blueprint(arrangement, make_active=False)
     stream.flush(timeout_sec=60.0)
     stream.disconnect()
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
     return path
 
 

@@ -7,50 +7,70 @@ import pytest
 from replay.bench import diff, recording, shipped, start
 from replay.bench.measure import Row
 
+METHODS = (
+    recording.PLAIN,
+    recording.LOG,
+    recording.BOTH,
+    recording.LIBRARY,
+    recording.MORE_PLAIN,
+    recording.MORE_BOTH,
+)
+
 
 def test_recordings_read_back_whole(small):
     rows = recording.on("a", small.model_copy(update={"rate": 2}), 1)
-    assert [(row.case, row.method) for row in rows] == [
-        ("a", method) for method in (recording.PLAIN, recording.LOG, recording.BOTH, recording.LIBRARY)
-    ]
+    assert [(row.case, row.method) for row in rows] == [("a", method) for method in METHODS]
     assert not any(row.failed for row in rows)
+    frames, *_, longer = (row.queries for row in rows)
+    assert longer - frames >= recording.MORE
+    assert not any(row.failed for row in recording.nothing(1))
 
 
 def row(case, method, frames, seconds, *, failed=False):
     return Row(case, method, seconds / frames, seconds / frames, seconds / frames, 1, 0.0, 0, frames, failed=failed)
 
 
-def made_up(frames, seconds):
-    """Return what `on` measures on a scene that takes a millisecond a frame and `seconds` to record."""
+def made_up(frames, once, more):
+    """Return what `on` measures on scenes whose recordings take so many seconds once, and so many a frame."""
 
     def on(name, _, rounds):
-        adds = {recording.PLAIN: 0.0, recording.LOG: 0.25 * seconds, recording.BOTH: seconds}
-        rows = [row(name, method, frames[name], frames[name] * 1e-3 + more) for method, more in adds.items()]
-        return [*rows, row(name, recording.LIBRARY, frames[name], 0.5 * seconds)]
+        n, longer = frames[name], frames[name] + 400
+        both = once + n * more
+        adds = {recording.PLAIN: 0.0, recording.LOG: 0.25 * both, recording.BOTH: both}
+        rows = [row(name, method, n, n * 1e-3 + seconds) for method, seconds in adds.items()]
+        rows += [row(name, recording.LIBRARY, n, 0.5 * both), row(name, recording.MORE_PLAIN, longer, longer * 1e-3)]
+        return [*rows, row(name, recording.MORE_BOTH, longer, longer * 1e-3 + once + longer * more)]
 
     return on
 
 
-def test_goals_are_those_of_the_worst_long_and_the_worst_short_scene(monkeypatch):
+def test_what_a_frame_more_costs_is_told_apart_from_what_a_recording_costs(monkeypatch):
     frames = {recording.GUARDED: 400, "b": 200, "c": 100, "d": 99, "e": 40}
     monkeypatch.setattr(recording, "shipped", lambda _: None)
-    monkeypatch.setattr(recording, "on", made_up(frames, 8e-3))
-    report = recording.run(scenes=tuple(frames))
+    monkeypatch.setattr(recording, "on", made_up(frames, 8e-3, 30e-6))
+    report = recording.run(scenes=tuple(frames), rounds=1)
     lines = report.grids[recording.COSTS].lines
-    assert list(lines[1].values()) == ["b", "200", "1.040", "10.0", "40.0", "20.0"]
+    assert list(lines[1].values()) == ["b", "200", "1.070", "17.5", "70.0", "35.0", "30.0", "8.0"]
+    assert list(lines[4].values()) == ["e", "40", "1.230", "57.5", "230.0", "115.0", "30.0", "8.0"]
     goals = {goal.key: (goal.measured, goal.verdict) for goal in report.goals}
     assert goals == {
-        "recording.ratio": (1.02, "met"),
-        "recording.frame": (80.0, "met"),
-        "recording.short": (200.0, "missed"),
+        "recording.ratio": (1.05, "met"),
+        "recording.frame": (30.0, "met"),
+        "recording.all": (110.0, "missed"),  # of c: d and e have too few frames
     }
+    monkeypatch.setattr(recording, "on", made_up(frames, 0.0, 101e-6))
+    verdicts = {goal.key: goal.verdict for goal in recording.run(scenes=("e",), rounds=1).goals}
+    assert verdicts == {"recording.ratio": "not measured", "recording.frame": "missed", "recording.all": "not measured"}
 
 
 def test_a_wrong_recording_is_never_a_fast_one(monkeypatch):
-    methods = (recording.PLAIN, recording.LOG, recording.BOTH, recording.LIBRARY)
+    def failed(name):
+        frames = {method: 700 if method in (recording.MORE_PLAIN, recording.MORE_BOTH) else 300 for method in METHODS}
+        return [row(name, m, frames[m], 0.1, failed=m != recording.LOG) for m in METHODS]
+
     monkeypatch.setattr(recording, "shipped", lambda _: None)
-    monkeypatch.setattr(recording, "on", lambda name, *_: [row(name, m, 300, 0.1, failed=m != "MCAP") for m in methods])
-    assert {goal.verdict for goal in recording.run().goals} == {"wrong"}
+    monkeypatch.setattr(recording, "on", lambda name, *_: failed(name))
+    assert {goal.verdict for goal in recording.run(rounds=1).goals} == {"wrong"}
 
 
 def test_every_scene_that_is_shipped_is_in_the_benchmark():
