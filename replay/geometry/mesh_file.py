@@ -6,13 +6,13 @@ import io
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import MeshError
-from replay.geometry import glb_check, obj_file, ply_check, stl_check
+from replay.geometry import glb_check, obj_file, ply_check, polygons, stl_check
 
 FORMATS: Final = (".stl", ".obj", ".ply", ".glb")
 """File endings that can be read; upper case too."""
@@ -23,6 +23,9 @@ _CHECKS: Final[dict[str, Callable[[bytes], int]]] = {
     ".glb": glb_check.check,
 }
 """Each returns how many faces the file announces at least; ValueError where it is not whole, or not wholly read."""
+
+_CORNERS: Final = ("vertex_indices", "vertex_index")
+"""What PLY files call the corners of a face."""
 
 _ADVICE = "; open it in a mesh editor and save it again as triangles"
 
@@ -37,7 +40,8 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
         data: the file's content when it has been read already.
 
     Raises:
-        MeshError: another format, or a file that is not whole: never fewer triangles than the file has.
+        MeshError: another format, a polygon that would be split wrongly, or a file that is not whole: never fewer
+            triangles than the file has.
     """
     name, ending = str(path), Path(path).suffix.lower()
     if ending not in FORMATS:
@@ -55,13 +59,18 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
         announced = _CHECKS[ending](data)
     except ValueError as error:
         raise MeshError(name, f"is not a usable {ending[1:].upper()} file: {error}") from None
-    vertices, faces = _by_trimesh(name, ending[1:], data)
+    mesh = _by_trimesh(name, ending[1:], data)
+    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     if len(faces) < announced:
         raise MeshError(name, f"announces {announced} faces, of which only {len(faces)} can be read{_ADVICE}")
+    if ending == ".ply" and len(faces) > announced:
+        _check_polygons(name, mesh)
     return vertices, faces
 
 
-def _by_trimesh(name: str, kind: str, data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
+    """Return a file as one trimesh.Trimesh."""
     import trimesh
 
     if b"\0" not in data:  # text, whose names and comments may be in any encoding
@@ -69,11 +78,26 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> tuple[NDArray[np.float64],
     try:
         with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks of the mesh
             warnings.simplefilter("ignore")
-            mesh = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False).to_mesh()
-            vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+            return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False).to_mesh()
     except Exception as error:  # a foreign parser on a foreign file may raise anything
         reason = " ".join(str(error).split()) or type(error).__name__
         if "unexpected length" in reason:  # trimesh's word for binary PLY whose lists differ in length
             reason = "it is cut, or its faces differ in their number of corners, which is read of text PLY only"
         raise MeshError(name, f"is not a usable {kind.upper()} file: {reason[:200]}{_ADVICE}") from error
-    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _check_polygons(name: str, mesh: Any) -> None:
+    """Refuse polygons of a PLY file that are not convex: trimesh splits them as if they were."""
+    raw = mesh.metadata["_ply_raw"]
+    points = np.column_stack([raw["vertex"]["data"][axis] for axis in "xyz"]).astype(np.float64)
+    listed = raw["face"]["data"]
+    if isinstance(listed, dict):  # of a text: lists of any length
+        corners = next(listed[key] for key in _CORNERS if key in listed)
+    else:
+        (key,) = listed.dtype.names if len(listed.dtype.names) == 1 else set(_CORNERS) & set(listed.dtype.names)
+        corners = listed[key]["f1"]
+    triangles, sizes = polygons.split(corners)
+    if sizes.all() and triangles.max() < len(points):  # what else there is to say of faces, the mesh's own checks say
+        folded = polygons.first_folded(points[triangles], sizes)
+        if folded is not None:
+            raise MeshError(name, f"the polygon of face {folded + 1} {polygons.NOT_CONVEX}")

@@ -8,7 +8,7 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
-_FOLD = 1e-6  # of a polygon's area: a triangle that turns back by less is the rounding of a straight edge
+from replay.geometry.polygons import NOT_CONVEX, first_folded
 
 
 def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -46,20 +46,9 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if len(faces) and faces.max() >= len(vertices) // 3:
         raise ValueError(f"a face refers to vertex {faces.max() + 1}, and there are {len(vertices) // 3}")
     points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    if len(faces) > len(sizes):
-        _check_convex(points[faces], np.array(sizes), np.array(lines))
+    if len(faces) > len(sizes) and (folded := first_folded(points[faces], np.array(sizes))) is not None:
+        raise ValueError(f"the polygon of line {lines[folded]} {NOT_CONVEX}")
     return points, faces
-
-
-def _check_convex(triangles: NDArray[np.float64], sizes: NDArray[np.int64], lines: NDArray[np.int64]) -> None:
-    """Refuse a polygon of which a triangle turns back over the others: it would cover what the polygon leaves free."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        whole = np.repeat(np.add.reduceat(normals, np.cumsum(sizes) - sizes), sizes, axis=0)
-        back = np.sum(normals * whole, axis=1) < -_FOLD * np.sum(whole * whole, axis=1)
-    if back.any():
-        line = np.repeat(lines, sizes)[int(np.argmax(back))]
-        raise ValueError(f"the polygon of line {line} is not convex and would be split wrongly; save it as triangles")
 
 
 def _index(word: str, before: int) -> int:

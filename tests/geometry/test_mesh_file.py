@@ -172,6 +172,22 @@ def test_obj_polygons_are_convex_or_refused():
     assert trimesh.Trimesh(*read_faces("u.obj", straight)).area == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize("names", [b"vertex_indices", b"vertex_index"])
+def test_ply_polygons_are_convex_or_refused(names):
+    """A quad with a notch and the letter U; convex faces around them are no reason."""
+    points = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]]
+    rows = "".join(f"{x} {y} {z}\n" for x, y, z in points).encode()
+    head = b"ply\nformat ascii 1.0\n" + QUADS.replace(b"vertex 4", b"vertex 5").replace(b"vertex_indices", names)
+    text = head.replace(b"FACES", b"2") + rows
+    assert "face 2 is not convex" in refused("a.ply", text + b"3 0 1 4\n5 0 1 2 3 4\n")
+    assert "face 1 is not convex" in refused("a.ply", text + b"4 1 2 3 4\n3 0 1 4\n")
+    assert len(read_faces("a.ply", text + b"4 3 0 1 2\n3 0 3 4\n")[1]) == 3  # the notch is the first corner
+    binary = head.replace(b"FACES", b"1").replace(b"ascii", b"binary_little_endian")
+    coordinates = np.array(points, np.float32).tobytes()
+    assert "face 1 is not convex" in refused("a.ply", binary + coordinates + struct.pack("<B4i", 4, 1, 2, 3, 4))
+    assert len(read_faces("a.ply", binary + coordinates + struct.pack("<B4i", 4, 0, 1, 2, 4))[1]) == 2
+
+
 def test_ply_of_quads_is_read_and_mixed_polygons_only_as_text():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     quad, triangle = struct.pack("<B4i", 4, 0, 1, 2, 3), struct.pack("<B3i", 3, 0, 1, 2)
