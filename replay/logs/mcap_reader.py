@@ -72,6 +72,7 @@ class McapLog:
         self.loss: Loss | None = None
         self._file = str(path)
         self._salvage = salvage
+        self._hint = "" if salvage or data is not None else "; `replay info` and `replay export` salvage what is whole"
         try:
             self._size = self.path.stat().st_size if data is None else len(data)
             self._stream: BinaryIO = self.path.open("rb") if data is None else io.BytesIO(data)
@@ -177,10 +178,10 @@ class McapLog:
         head = self._bytes_at(at, RECORD_HEAD) if at + RECORD_HEAD <= self._size else b""
         op, length = struct.unpack("<BQ", head) if head else (0, 0)
         if not head or at + RECORD_HEAD + length > self._size:
-            hint = "" if self._salvage else "; `replay info` and `replay export` salvage what is whole"
             raise RecordingError(
                 self._file,
-                f"cut at byte {self._size}, in the record at byte {at}: its run was stopped, or it is damaged{hint}",
+                f"cut at byte {self._size}, in the record at byte {at}: its run was stopped, or it is damaged"
+                f"{self._hint}",
             )
         if length > MAX_RECORD:
             raise self._damage(
