@@ -1,0 +1,37 @@
+"""The exact reading where scenes meet it exactly: needles at poles, touching planes, ranges that end on an edge."""
+
+import itertools
+import math
+
+import numpy as np
+from replay.sensing.distance import closest_in_cone
+
+DEG = math.pi / 180.0
+
+
+def pole(count: int, radius: float) -> np.ndarray:
+    """Return the needles about the south pole of a sphere whose corners there are the same but for last digits."""
+    polar = np.array([math.pi * (count - 1) / count, math.pi])
+    around = 2.0 * math.pi * np.arange(count + 1) / count
+    ring, tip = (
+        radius * np.stack([math.sin(p) * np.cos(around), math.sin(p) * np.sin(around), 0 * around + math.cos(p)], 1)
+        for p in polar
+    )
+    return np.stack([ring[:-1], tip[:-1], tip[1:]], axis=1)
+
+
+def test_a_needle_is_not_seen_beyond_its_tip():
+    # the foot or the conic lay within rounding of the lines of both long edges, but far from the needle
+    needles = np.concatenate([pole(count, radius) for count in (4, 8, 12) for radius in (0.1, 0.5)])
+    rng = np.random.default_rng(5)
+    hits = 0
+    for corners, aperture in itertools.product(needles, (20 * DEG, 90 * DEG, math.pi, 270 * DEG)):
+        direction = corners[0] - corners[1]
+        apex = corners[1] + direction * rng.choice([-3.0, -0.5, 0.5, 2.0, 27.0]) + 0.1 * rng.integers(-1, 2, 3)
+        axis = rng.choice([-1, 1]) * np.identity(3)[rng.integers(3)] if rng.random() < 0.5 else corners[0] - apex
+        hit = closest_in_cone([corners], apex, axis, aperture)
+        if hit.detected:
+            hits += 1
+            place = np.clip((hit.point - corners[1]) @ direction / (direction @ direction), 0.0, 1.0)
+            assert np.linalg.norm(corners[1] + place * direction - hit.point) < 1e-14
+    assert hits > 100
