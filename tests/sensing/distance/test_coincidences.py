@@ -35,3 +35,10 @@ def test_a_needle_is_not_seen_beyond_its_tip():
             place = np.clip((hit.point - corners[1]) @ direction / (direction @ direction), 0.0, 1.0)
             assert np.linalg.norm(corners[1] + place * direction - hit.point) < 1e-14
     assert hits > 100
+
+
+def test_a_plane_that_touches_the_cone_has_nothing_behind_the_apex():
+    # the edge from (-1, -0.5, 1) to (1, 0.5, 0) lies in a plane that touches the cone about -x, on the far side of the
+    # apex too
+    corners = [[[1.0, 0.5, 0.0], [0.1, 0.1, 0.1], [-1.0, -0.5, 1.0]]]
+    assert not closest_in_cone(corners, [0, 0, 0], [-1, 0, 0], 2.0 * math.atan(0.5)).detected
