@@ -50,6 +50,24 @@ def _in_volume(x: float, entry: float, exit: float, wide: bool) -> bool:
 
 
 @kernel
+def _foot(a: Vector, e: Vector, area: Vector, doubled: float, squared: float) -> tuple[float, Vector]:
+    """Return distance and place of the foot of the apex on an edge's line.
+
+    On a line along an axis it takes two coordinates from the corner as they are, so that a range that ends on the edge
+    of a box senses it.
+    """
+    if e[1] == 0.0 and e[2] == 0.0:
+        foot = (0.0, a[1], a[2])
+    elif e[2] == 0.0 and e[0] == 0.0:
+        foot = (a[0], 0.0, a[2])
+    elif e[0] == 0.0 and e[1] == 0.0:
+        foot = (a[0], a[1], 0.0)
+    else:
+        return doubled / math.sqrt(squared), scaled(1.0 / squared, cross(e, area))
+    return norm(foot), foot
+
+
+@kernel
 def closest_on_edge(
     a: Vector, b: Vector, length_a: float, length_b: float, cone: Cone, size: Vector
 ) -> tuple[float, Vector, int]:
@@ -62,10 +80,9 @@ def closest_on_edge(
         return _radial_edge(a, b, length_a, length_b, cone)
 
     # Foot of the apex on the edge
-    off_line = doubled / math.sqrt(squared)
+    off_line, foot = _foot(a, e, area, doubled, squared)
     has_foot = dot(a, e) < 0.0 < dot(b, e)
     nearest = off_line if has_foot else min(length_a, length_b)
-    foot = scaled(1.0 / squared, cross(e, area))
     if has_foot and touches(foot, off_line, size):
         return 0.0, (0.0, 0.0, 0.0), EDGE_FOOT
 

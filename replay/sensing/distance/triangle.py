@@ -112,7 +112,9 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
     # no wider than the slack it is its edges, and its normal may be nothing but rounding
     slack = _LATERAL * extent
     if squared > slack * slack * longest:
-        turned = scaled(1.0 / math.sqrt(squared), area)
+        # divided, so that the normal of a plane across an axis is exact, and with it the distance of a wall
+        length = math.sqrt(squared)
+        turned = (area[0] / length, area[1] / length, area[2] / length)
         nearest = a
         if length_b <= length_a and length_b <= length_c:
             nearest = b

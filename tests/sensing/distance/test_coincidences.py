@@ -4,9 +4,17 @@ import itertools
 import math
 
 import numpy as np
+import pytest
+
 from replay.sensing.distance import closest_in_cone
 
 DEG = math.pi / 180.0
+TURNS = [
+    turn
+    for order in itertools.permutations(np.identity(3))
+    for signs in itertools.product((-1.0, 1.0), repeat=3)
+    if np.linalg.det(turn := np.array(order) * signs) > 0.0
+]
 
 
 def pole(count: int, radius: float) -> np.ndarray:
@@ -42,3 +50,20 @@ def test_a_plane_that_touches_the_cone_has_nothing_behind_the_apex():
     # apex too
     corners = [[[1.0, 0.5, 0.0], [0.1, 0.1, 0.1], [-1.0, -0.5, 1.0]]]
     assert not closest_in_cone(corners, [0, 0, 0], [-1, 0, 0], 2.0 * math.atan(0.5)).detected
+
+
+@pytest.mark.parametrize("reach", [0.05, 0.2, 0.7, 0.84, 1.0 / 3.0])
+def test_a_range_that_ends_on_a_face_edge_or_corner_senses_it(reach):
+    wall = [
+        [[-0.3, -0.7, reach], [0.25, -0.7, reach], [0.25, 0.1, reach]],
+        [[-0.3, -0.7, reach], [0.25, 0.1, reach], [-0.3, 0.1, reach]],
+    ]
+    edge = [[[-0.25, 0.0, reach], [0.1, 0.0, reach], [0.1, 0.0, reach + 0.5]]]
+    slanted = [[[-0.3, 0.0, reach], [0.7, 0.0, reach], [0.1, 0.3, reach + 0.5]]]
+    corner = [[[0.0, 0.0, reach], [0.3, 0.1, reach + 0.5], [-0.2, 0.1, reach + 0.4]]]
+    for shape, turn in itertools.product((wall, edge, slanted, corner), TURNS):
+        corners = np.array(shape) @ turn.T
+        for order in itertools.permutations(range(3)):
+            hit = closest_in_cone(corners[:, order], [0, 0, 0], turn[:, 2], 30 * DEG, range=reach)
+            assert hit.detected
+            assert hit.distance == reach
