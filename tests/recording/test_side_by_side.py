@@ -67,3 +67,13 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
     (tmp_path / "b.rrd").write_text("nothing")
     with pytest.raises(ViewerError, match=r"b\.rrd: cannot be read"), one_recording([file, tmp_path / "b.rrd"]):
         pass
+    whole = file.read_bytes()
+    for name, data in {"cut": whole[: len(whole) // 2], "empty": b""}.items():
+        (tmp_path / f"{name}.rrd").write_bytes(data)
+        with (
+            pytest.raises(ViewerError, match=rf"{name}\.rrd: cannot be read"),
+            one_recording([tmp_path / f"{name}.rrd"]),
+        ):
+            pass
+    with one_recording([file]) as shown:
+        assert shown == file
