@@ -40,9 +40,9 @@ def show(file: Path, *, web: bool = False) -> None:
     Raises:
         ViewerError: the viewer is not installed or fails, as it does without a display.
     """
-    command = [str(viewer_binary()), str(file)]
+    command = [str(viewer_binary()), str(file), "--bind", "127.0.0.1"]  # the window takes data from others too
     if web:
-        command += ["--web-viewer", "--bind", "127.0.0.1"]
+        command.append("--web-viewer")
     begun: list[subprocess.Popen[bytes]] = []
     try:
         with ThreadPoolExecutor(1) as starter:  # no signal interrupts a thread: a viewer that has begun is known here
