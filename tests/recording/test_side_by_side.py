@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from rerun.chunk import RrdReader
 from replay.errors import ViewerError
 from replay.recording.rerun_log import RerunWriter
 from replay.recording.side_by_side import one_recording, side_names
+from replay.recording.viewer import free_port
 from tests.recording import moving
 
 
@@ -77,3 +79,13 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
             pass
     with one_recording([file]) as shown:
         assert shown == file
+
+
+def test_a_second_viewer_for_browsers_finds_a_port() -> None:
+    with socket.socket() as first:
+        first.bind(("127.0.0.1", 0))
+        first.listen()
+        taken = first.getsockname()[1]
+        second = free_port(taken)
+        assert second not in (0, taken)
+    assert free_port(taken) == taken
