@@ -67,7 +67,7 @@ def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys)
     before = (recorded / "swing.mcap").read_bytes()
     assert run(["run", str(scenario), "-o", str(recorded.parent)]) is ExitCode.INVALID
     assert "exists already; pass --overwrite" in capsys.readouterr().err
-    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite", "--no-rrd"]) is ExitCode.FINE
+    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite"]) is ExitCode.FINE
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
 
