@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -17,6 +18,7 @@ from replay.scenario.names import Names
 from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
+from replay.scenario.sensors import Sensors
 from replay.scenario.source import (
     Attached,
     Folder,
@@ -163,8 +165,9 @@ class _File:
         try:
             scenario = Scenario.model_validate(root.data())
         except ValidationError as error:
-            problems.extend(translate(error, root, Scenario))
-        problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
+            problems.extend(_not_told(problems, translate(error, root, Scenario)))
+        if self._text.whole and _sections_known(root):  # else names would be missed that are written
+            problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
         provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:
@@ -216,6 +219,21 @@ def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> l
     found, problems = tracks(scenario, library.shown(name), provenance.sources[name])
     provenance.tracks.update(found)
     return problems
+
+
+def _sections_known(root: Node) -> bool:
+    """Return whether no section that gives names is misspelt, which is told already."""
+    sensors = root.child("sensors")
+    unknown = root.mapping.keys() - Scenario.model_fields.keys()
+    return not any(get_close_matches(key, ("include", "links", "sensors"), cutoff=0.6) for key in unknown) and (
+        sensors is None or sensors.mapping.keys() <= Sensors.model_fields.keys()
+    )
+
+
+def _not_told(told: list[Problem], found: list[Problem]) -> list[Problem]:
+    """Return what was found at other places than what is told already: a value that cannot be read is told once."""
+    places = {(problem.file, problem.line, problem.column) for problem in told}
+    return [problem for problem in found if (problem.file, problem.line, problem.column) not in places]
 
 
 def _in_order(problems: list[Problem]) -> list[Problem]:

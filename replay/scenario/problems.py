@@ -70,10 +70,11 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
         place = above.keys.get(str(path[-1]), root.place) if above is not None else root.place
         return place.problem(f"{dotted(path)}: unknown key; {did_you_mean(str(path[-1]), known)}")
     if kind in ("rule", "quantity"):
-        return problem_at(root, (*path, *context.get("at", ())), context["rule"])
+        return problem_at(root, (*path, *context.get("at", ())), context["rule"], kind=kind == "quantity")
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _tag(kind, context, path, root)
-    return problem_at(root, path, _rule(kind, context, detail["msg"], find(root, path)))
+        return _tag(kind, context, found, root)
+    rule = _rule(kind, context, detail["msg"], find(root, path))
+    return problem_at(root, path, rule, kind=kind.endswith("_type"))
 
 
 def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -> str:
@@ -134,23 +135,33 @@ def _missing(found: _Location, last: str | int, root: Node) -> Problem:
     return locate(root, path).problem(f"{dotted((*path, last))} is missing{hint}")
 
 
-def _tag(kind: str, context: dict[str, Any], path: Path, root: Node) -> Problem:
+def _tag(kind: str, context: dict[str, Any], found: _Location, root: Node) -> Problem:
+    path = found.path
     if kind == "union_tag_invalid":
         known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
         return problem_at(root, (*path, "type"), f"is unknown; {did_you_mean(str(context['tag']), known)}")
     if context["discriminator"] == "'type'":
-        return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing")
+        node = find(root, path)
+        if node is not None and not isinstance(node.value, dict):
+            return problem_at(root, path, "must be a mapping (key: value)", kind=True)
+        return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing; known are {', '.join(found.tags)}")
     return problem_at(root, path, "needs one of the keys pair, distance, capacitive")
 
 
 @dataclass(frozen=True)
 class _Location:
-    """Where an error is; `owner` is the model, `length` the length of the list, that the last step belongs to."""
+    """Where an error is.
+
+    Attributes:
+        owner, length: the model, and the length of the list, that the last step belongs to.
+        tags: the types that the value may have, where it is one of several.
+    """
 
     path: Path
     owner: type[BaseModel] | None = None
     length: int | None = None
     on_key: bool = False
+    tags: tuple[str, ...] = ()
 
 
 def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Location:
@@ -176,7 +187,9 @@ def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Lo
             break
         node = below
         path.append(step)
-    return _Location(tuple(path), owner, length)
+    plain = _plain(annotation)
+    tags = (_tags(member) for member in get_args(plain)) if get_origin(plain) in (Union, types.UnionType) else ()
+    return _Location(tuple(path), owner, length, tags=tuple(tag for several in tags for tag in several))
 
 
 def _plain(annotation: Any) -> Any:
@@ -197,15 +210,16 @@ def _choose(annotation: Any, step: str | int) -> Any:
     """Return the member of a union that a tag stands for, or None when this is no union."""
     if get_origin(annotation) not in (Union, types.UnionType):
         return None
-    for member in get_args(annotation):
-        tags = [getattr(item, "tag", None) for item in get_args(member)[1:]] if get_origin(member) is Annotated else []
-        plain = _plain(member)
-        fields = getattr(plain, "model_fields", {})
-        if "type" in fields and get_origin(fields["type"].annotation) is Literal:
-            tags.extend(get_args(fields["type"].annotation))
-        if step in tags:
-            return member
-    return None
+    return next((member for member in get_args(annotation) if step in _tags(member)), None)
+
+
+def _tags(member: Any) -> list[Any]:
+    """Return what selects a member of a union: its tag, or its literal `type`."""
+    tags = [getattr(item, "tag", None) for item in get_args(member)[1:]] if get_origin(member) is Annotated else []
+    fields = getattr(_plain(member), "model_fields", {})
+    if "type" in fields and get_origin(fields["type"].annotation) is Literal:
+        tags.extend(get_args(fields["type"].annotation))
+    return tags
 
 
 def _below(annotation: Any, step: str | int) -> Any:

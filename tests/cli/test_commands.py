@@ -117,6 +117,15 @@ def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
     assert lines[-1] == "replay: error: ... and 900 more"
 
 
+def test_a_note_that_the_cases_of_a_sweep_share_is_said_once(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        SCENARIO.replace("EXPECTED", "never").replace("time: 1,", "time: 3,") + "sweep: {grid: {rate: [10, 20]}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.FINE
+    assert capsys.readouterr().err.count("after the scenario's end") == 1
+
+
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
     entry = json.loads(capsys.readouterr().out)[0]
