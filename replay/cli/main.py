@@ -102,7 +102,8 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except click.ClickException as error:
         context = error.ctx if isinstance(error, click.UsageError) else None
         hint = f"; see {context.command_path} --help" if context else ""
-        click.echo(f"replay: error: {error.format_message().rstrip('.')}{hint}", err=True)
+        message = " ".join(error.format_message().split()).rstrip(".")
+        click.echo(f"replay: error: {message}{hint}", err=True)
         return ExitCode.INVALID
     except ReplayError as error:
         lines = str(error).splitlines()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from replay.errors import Problem, ScenarioError
+from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
 from replay.scenario.checks import check
 from replay.scenario.include import Text
@@ -82,17 +82,20 @@ def load_model(file_or_name: str | Path) -> Model:
     """Return a built-in model by its name, or the model that a YAML file holds.
 
     Raises:
+        InvalidValue: the name is empty.
         ScenarioError: there is neither a model nor a file of that name, or the file is not a valid model.
     """
     if str(file_or_name) in BUILTIN_MODELS:
         return BUILTIN_MODELS[str(file_or_name)]
+    names = ", ".join(sorted(BUILTIN_MODELS))
+    if not str(file_or_name):
+        raise InvalidValue("model", "''", f"names none; give a file, or a built-in model: {names}")
     library = Folder(Path(file_or_name))
     shown = library.shown(library.main)
     problems: list[Problem] = []
     try:
         root = parse(library.read(library.main), shown, problems)
     except SourceRule as error:
-        names = ", ".join(sorted(BUILTIN_MODELS))
         raise ScenarioError([Problem(f"{error}; built-in models are: {names}", file=shown)]) from None
     if root is None or problems:
         raise ScenarioError(problems)

@@ -234,7 +234,13 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
         (["view", "none.rrd"], "no such file"),
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
         (["view", "none.rrd", "--at", "1"], "--at belongs to --screenshot"),
+        (["view", "none.rrd", "--screenshot", "x.jpg"], "x.jpg must end in .png"),
         (["run", "none.yaml"], "is not there"),
+        (["run", "/dev/null"], "is neither a file nor a folder"),
+        (["run", ""], "the path is empty"),
+        (["run", "x", "-o", ""], "the path is empty"),
+        (["run", "x", "--model", ""], "model = '': names none; give a file, or a built-in model: thesis2015"),
+        (["export", "x.mcap"], "Missing option '--format'. Choose from: csv, json, parquet; see replay export --help"),
         (["view", "none.rrd", "--screenshot", "x.png", "--at", "nan"], "is no moment of a recording"),
     ],
 )
