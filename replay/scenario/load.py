@@ -99,8 +99,11 @@ def load_model(file_or_name: str | Path) -> Model:
         raise ScenarioError([Problem(f"{error}; built-in models are: {names}", file=shown)]) from None
     if root is None or problems:
         raise ScenarioError(problems)
-    if not isinstance(root.value, dict):
-        raise ScenarioError([root.place.problem("a model is a mapping with collision, distance and capacitive")])
+    if not isinstance(root.value, dict) or "links" in root.mapping:
+        what = "a scenario" if root.mapping else root.shown()
+        raise ScenarioError(
+            [root.place.problem(f"a model is a mapping of collision, distance, capacitive, not {what}")]
+        )
     try:
         return Model.model_validate(builtin_model(root.data()))
     except ValidationError as error:
@@ -165,11 +168,13 @@ class _File:
 
     def _validated(self, root: Node, problems: list[Problem]) -> Scenario:
         scenario: Scenario | None = None
+        named = self._text.whole and _sections_known(root)
         try:
             scenario = Scenario.model_validate(root.data())
         except ValidationError as error:
             problems.extend(_not_told(problems, translate(error, root, Scenario)))
-        if self._text.whole and _sections_known(root):  # else names would be missed that are written
+            named = named and not any("[key]" in detail["loc"] for detail in error.errors(include_url=False))
+        if named:  # else names would be missed that are written, but not to be read
             problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
         provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
