@@ -104,6 +104,8 @@ def load_model(file_or_name: str | Path) -> Model:
         raise ScenarioError(
             [root.place.problem(f"a model is a mapping of collision, distance, capacitive, not {what}")]
         )
+    if set(root.mapping) == {"model"}:
+        raise ScenarioError([root.keys["model"].problem("model: a file of a model begins one level below this key")])
     try:
         return Model.model_validate(builtin_model(root.data()))
     except ValidationError as error:
