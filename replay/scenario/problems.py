@@ -74,7 +74,9 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag(kind, context, found, root)
     rule = _rule(kind, context, detail["msg"], find(root, path))
-    return problem_at(root, path, rule, kind=kind.endswith("_type"))
+    if kind == "tuple_type" and found.entries:
+        rule += f" of {found.entries}"
+    return problem_at(root, path, rule, kind=kind.endswith("_type") or kind == "literal_error")
 
 
 def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -> str:
@@ -155,6 +157,7 @@ class _Location:
     Attributes:
         owner, length: the model, and the length of the list, that the last step belongs to.
         tags: the types that the value may have, where it is one of several.
+        entries: how many entries the value has, where it is a list of so many.
     """
 
     path: Path
@@ -162,6 +165,7 @@ class _Location:
     length: int | None = None
     on_key: bool = False
     tags: tuple[str, ...] = ()
+    entries: int | None = None
 
 
 def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Location:
@@ -180,7 +184,7 @@ def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Lo
         if step == "[key]":
             return _Location(tuple(path), on_key=True)
         owner = annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
-        length = len(get_args(annotation)) if get_origin(annotation) is tuple else None
+        length = _entries(annotation)
         annotation = _below(annotation, step)
         below = None if node is None else node.child(step)
         if below is None:
@@ -189,7 +193,14 @@ def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Lo
         path.append(step)
     plain = _plain(annotation)
     tags = (_tags(member) for member in get_args(plain)) if get_origin(plain) in (Union, types.UnionType) else ()
-    return _Location(tuple(path), owner, length, tags=tuple(tag for several in tags for tag in several))
+    known = tuple(tag for several in tags for tag in several)
+    return _Location(tuple(path), owner, length, tags=known, entries=_entries(plain))
+
+
+def _entries(annotation: Any) -> int | None:
+    """Return how many entries a list of fixed length has; None for other values."""
+    fixed = get_origin(annotation) is tuple and Ellipsis not in get_args(annotation)
+    return len(get_args(annotation)) if fixed else None
 
 
 def _plain(annotation: Any) -> Any:
