@@ -251,6 +251,15 @@ def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     assert said.startswith("replay: error: ") and said.count("\n") == 1
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a system without /dev/full")
+def test_a_result_that_standard_output_has_no_space_for_is_one_line(scenario):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "replay", "validate", str(scenario)]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == ExitCode.INVALID
+    assert done.stderr == ("replay: error: the result cannot be written to standard output: No space left on device\n")
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])
 def test_light_commands_load_nothing_heavy(arguments, scenario):
     arguments = [str(scenario) if argument == "SCENARIO" else argument for argument in arguments]
