@@ -54,7 +54,8 @@ def picture(
 
     Raises:
         ViewerError: the viewer is not installed, cannot render here (it needs a Vulkan driver, such as Debian's
-            mesa-vulkan-drivers), cannot read the recording, or does not come to rest in time.
+            mesa-vulkan-drivers), cannot read the recording, or does not come to rest in time; or the recording ends
+            before the moment.
         WriteError: the picture cannot be written.
     """
     recording, png = Path(recording), Path(png)
@@ -67,7 +68,10 @@ def picture(
         lines = {line.name: line for line in shown.timelines}
         if TIMELINE not in lines or lines[TIMELINE].end is None:
             raise ViewerError(f"{recording}: has no timeline {TIMELINE!r}; is it a recording of replay?")
-        moment = int(lines[TIMELINE].end) if at is None else round(at * 1e9)
+        end_ns = int(lines[TIMELINE].end)
+        moment = end_ns if at is None else round(at * 1e9)
+        if moment > end_ns:
+            raise ViewerError(f"{recording}: has no moment {at:g} s; it ends at {end_ns / 1e9:g} s")
         viewer.set_time(TIMELINE, duration=_nanoseconds(moment), play_state="paused")
         time.sleep(max(0.0, _TOASTS - (time.monotonic() - began)))
         before, now = b"", None

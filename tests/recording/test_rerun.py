@@ -194,6 +194,8 @@ def test_cones_have_their_aperture_and_range() -> None:
 @pytest.mark.skipif(not list(Path("/usr/share/vulkan/icd.d").glob("*.json")), reason="needs a Vulkan driver")
 def test_the_viewer_shows_contact_in_red(path: Path, tmp_path: Path) -> None:
     picture(path, tmp_path / "contact.png", at=2.5, size=(1000, 700))
+    with pytest.raises(ViewerError, match="has no moment 99 s; it ends at "):
+        picture(path, tmp_path / "late.png", at=99.0)
     with Image.open(tmp_path / "contact.png") as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
     scene = pixels[:, : pixels.shape[1] // 2]

@@ -70,7 +70,10 @@ def ros_json(stamp_ns: int, joints: dict[str, float]) -> bytes:
     return json.dumps({"header": {"stamp": stamp}, "name": list(joints), "position": list(joints.values())}).encode()
 
 
-def log(kind: str, topic: str = "/joint_states") -> bytes:
+EPOCH = 1_700_000_000_123_456_789  # [ns]
+
+
+def log(kind: str, topic: str = "/joint_states", epoch: int = EPOCH) -> bytes:
     """A robot's log that begins at an odd epoch, with every sample of both joints."""
     stream = io.BytesIO()
     writer = Writer(stream)
@@ -81,7 +84,7 @@ def log(kind: str, topic: str = "/joint_states") -> bytes:
     channel = writer.register_channel(topic, kind, schema)
     encode = cdr if kind == "cdr" else ros_json
     for second, swing, lift in zip(SECONDS, SWING, LIFT, strict=True):
-        stamp = 1_700_000_000_123_456_789 + round(second * 1e9)
+        stamp = epoch + round(second * 1e9)
         writer.add_message(channel, 5, encode(stamp, {"j1": swing, "lift": lift}), 5)
     writer.finish()
     return stream.getvalue()
@@ -191,8 +194,11 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
             {"log.csv": b"time,swing\n1,0\n1,1\n"},
             "times in the log that do not increase",
         ),
-        ("{recorded: {file: log.csv}}", {"log.csv": b"\xff\xfe"}, "cannot be read as CSV"),
-        ("{recorded: {file: log.csv}}", {"log.csv": b""}, "has no column 'time'"),
+        ("{recorded: {file: log.csv}}", {"log.csv": b"time\n\xff\xfe"}, "line 2: byte 0xff is not UTF-8"),
+        ("{recorded: {file: log.csv}}", {"log.csv": b""}, "has no headings in its first line"),
+        ("{recorded: {file: log.csv}}", {"log.csv": b"time,swing\n0,0\n1,1_0\n"}, "'1_0' is not a finite number"),
+        ("{recorded: {file: log.csv}}", {"log.csv": b"time,swing\n0,0\n1e300,1\n"}, "line 3, column 'time': 1e300 is"),
+        ("{recorded: {file: robot.mcap}}", {"robot.mcap": log("json", epoch=1 << 64)}, "has a sample at 1.84467e+10 s"),
         ("{recorded: {file: log.csv, joints: {swing: {name: swing}}}}", {"log.csv": b"time,swing\n"}, "no samples"),
         ("{recorded: {file: log.csv, start: 2 s}}", {}, "is after the log's last sample, 0.5 s after its first"),
     ],
