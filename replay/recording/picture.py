@@ -74,7 +74,7 @@ def picture(
         end = int(lines[TIMELINE].end)
         moment = end if at is None else round(at * 1e9)
         if moment > end + _TYPED:
-            raise ViewerError(f"{recording}: ends at {end * 1e-9:.6g} s, before {at:g} s")
+            raise ViewerError(f"{recording}: has no moment {at:g} s; it ends at {end / 1e9:g} s")
         viewer.set_time(TIMELINE, duration=_nanoseconds(min(moment, end)), play_state="paused")
         time.sleep(max(0.0, _TOASTS - (time.monotonic() - began)))
         before, now = b"", None

@@ -118,6 +118,15 @@ def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
     assert lines[-1] == "replay: error: ... and 900 more"
 
 
+def test_a_note_that_the_cases_of_a_sweep_share_is_said_once(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        SCENARIO.replace("EXPECTED", "never").replace("time: 1,", "time: 3,") + "sweep: {grid: {rate: [10, 20]}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.FINE
+    assert capsys.readouterr().err.count("after the scenario's end") == 1
+
+
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert run(["validate", str(scenario), "--deep", "--format", "json"]) is ExitCode.FINE
     entry = json.loads(capsys.readouterr().out)[0]
@@ -226,7 +235,13 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
         (["view", "none.rrd"], "no such file"),
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
         (["view", "none.rrd", "--at", "1"], "--at belongs to --screenshot"),
+        (["view", "none.rrd", "--screenshot", "x.jpg"], "x.jpg must end in .png"),
         (["run", "none.yaml"], "is not there"),
+        (["run", "/dev/null"], "is neither a file nor a folder"),
+        (["run", ""], "the path is empty"),
+        (["run", "x", "-o", ""], "the path is empty"),
+        (["run", "x", "--model", ""], "model = '': names none; give a file, or a built-in model: thesis2015"),
+        (["export", "x.mcap"], "Missing option '--format'. Choose from: csv, json, parquet; see replay export --help"),
         (["view", "none.rrd", "--screenshot", "x.png", "--at", "nan"], "is no moment of a recording"),
     ],
 )
@@ -235,6 +250,15 @@ def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     said = capsys.readouterr().err
     assert message in said
     assert said.startswith("replay: error: ") and said.count("\n") == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a system without /dev/full")
+def test_a_result_that_standard_output_has_no_space_for_is_one_line(scenario):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "replay", "validate", str(scenario)]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == ExitCode.INVALID
+    assert done.stderr == ("replay: error: the result cannot be written to standard output: No space left on device\n")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])

@@ -197,7 +197,7 @@ def test_the_viewer_shows_contact_in_red(path: Path, tmp_path: Path, monkeypatch
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # what the viewer is given stands there
     named = tmp_path / "検査 ∕ 😀.rrd"  # the viewer's font has none of these letters
     named.write_bytes(path.read_bytes())
-    with pytest.raises(ViewerError, match="before 99 s"):
+    with pytest.raises(ViewerError, match="has no moment 99 s; it ends at "):
         picture(named, tmp_path / "late.png", at=99.0)
     picture(named, tmp_path / "contact.png", at=2.5, size=(1000, 700))
     with Image.open(tmp_path / "contact.png") as image:
