@@ -20,7 +20,26 @@ Ints = NDArray[np.int64]
 
 LANES = 64
 COLUMNS = 52
-"""Size of `lanes`: (COLUMNS x LANES,)."""
+"""Size of `lanes`: (COLUMNS x LANES,). Its first 40 columns hold a row of `Clusters.outlines`, `triangles` or
+`moments`, or of a pool of pieces, in the columns it has there."""
+
+CORNERS_FROM = 16
+"""First of nine columns beside a triangle's row: x, y, then z of its corners, as a point rule takes the distance."""
+
+FOUND = 40
+ERROR, SHIFT, LEAST, REGION = range(4)
+"""What is found of a node or triangle, in the columns from FOUND on: the bound of its error [m], what its expansion or
+rule is corrected by [m], a lower bound of its integral [m], and the region it is expanded in, see `region_of`."""
+
+VERDICT, RULE_FOUND, FIRST_RULE, ALLOWED = range(44, 48)
+"""Columns: the verdict on a node or triangle; a triangle's rule, the first that comes into question, and the error that
+it may make [m]."""
+
+SUM = 49
+"""Column: the sum over a node or triangle [m]."""
+
+DROP, OPEN, KEEP = -1, 0, 1
+"""Verdicts: nothing of it counts; it must be opened; it can be summed as a whole."""
 
 
 @inlined_kernel
