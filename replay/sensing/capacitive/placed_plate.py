@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel
+from replay.numerics.jit import inlined_kernel, kernel
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -41,7 +41,7 @@ class PlacedPlate(NamedTuple):
     blur: float
 
 
-@inlined_kernel
+@kernel
 def placed_plate(T: Floats, half_x: float, half_y: float, both: bool, facing: bool, blur_of_body: float) -> PlacedPlate:
     """Return a plate at T_plate_body; `blur_of_body` [m] is how far off places are in the body's frame."""
     centre = (
