@@ -34,13 +34,13 @@ from replay.sensing.capacitive.lanes import (
 )
 from replay.sensing.capacitive.placed_plate import PlacedPlate, faces_centre, place_triangle, write_triangle
 from replay.sensing.capacitive.point_sums import TRIANGLE_3, sum_by_points
-from replay.sensing.capacitive.room import Room
 from replay.sensing.capacitive.saturation import may_touch
 from replay.sensing.capacitive.triangle_bounds import judge_loaded
 from replay.sensing.capacitive.triangle_pieces import MOST_PIECES, OWNER, PIECE, Pieces, cut, quarter, write_piece
 from replay.sensing.capacitive.triangle_rules import POINTS_1, POINTS_3
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 IN_FOUR = 2
 """How a piece is cut that no border runs through."""
@@ -51,17 +51,24 @@ _WHERE, _BY = OWNER + 1, OWNER + 2
 
 @leaf_kernel
 def sum_hard(
-    triangles: Floats, plate: PlacedPlate, room: Room, begin: int, count: int, share: float
+    triangles: Floats,
+    hard: Ints,
+    begin: int,
+    count: int,
+    plate: PlacedPlate,
+    share: float,
+    pieces: Pieces,
+    lanes: Floats,
 ) -> tuple[float, float, int]:
-    """Return the sum over room.hard[begin : begin + count] and its error bound [m], at most `share` for each of them.
+    """Return the sum over the rows hard[begin : begin + count] and its error bound [m], at most `share` for each.
 
     Last is how many are left out of it, written to `pieces.slow`: those that may touch the plate, and those that would
     need too many pieces.
     """
-    pieces, pool = room.pieces, room.pieces.pool
+    pool = pieces.pool
     slow, size, owners = 0, 0, 0
     for at in range(begin, begin + count):
-        k = room.hard[at]
+        k = hard[at]
         a, b, c = place_triangle(plate.T_plate_body, triangles, k)
         area, low, high = triangles[k, SIZE], min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
         if may_touch(a, b, c, plate.half_x, plate.half_y):
@@ -75,7 +82,7 @@ def sum_hard(
             if not plate.both and low < 0.0:
                 size = cut(pool, size, 2, 0.0)
             size = _sum_before_plate(pieces, plate, first, size)
-    _sum_pieces(pieces, plate, size, room.lanes)
+    _sum_pieces(pieces, plate, size, lanes)
     total, spent = 0.0, 0.0
     for owner in range(owners):
         if pieces.made[owner] > MOST_PIECES:
@@ -88,17 +95,17 @@ def sum_hard(
 
 
 @kernel
-def sum_exactly(triangles: Floats, plate: PlacedPlate, room: Room, count: int) -> tuple[float, bool]:
-    """Return the closed form of the first `count` of `pieces.slow` [m], inf if saturated, and whether one touches."""
-    half_x, half_y, both, triangle = plate.half_x, plate.half_y, plate.both, room.triangle
+def sum_exactly(triangles: Floats, plate: PlacedPlate, pieces: Pieces, count: int) -> tuple[float, bool]:
+    """Return the closed form of the first `count` of pieces.slow [m], inf if saturated, and whether one touches."""
+    half_x, half_y, both, triangle = plate.half_x, plate.half_y, plate.both, pieces.triangle
     total, touching = 0.0, False
     for i in range(count):
-        k = room.pieces.slow[i]
+        k = pieces.slow[i]
         a, b, c = place_triangle(plate.T_plate_body, triangles, k)
         write_triangle(a, b, c, triangle)
         touching = touching or contact(triangle, half_x, half_y, both) != CLEAR
         if not (plate.facing and not faces_centre(a, b, c)):
-            total += integral_over_triangle(triangle, triangles[k, SIZE], half_x, half_y, both, room.scratch)
+            total += integral_over_triangle(triangle, triangles[k, SIZE], half_x, half_y, both, pieces.scratch)
     return total, touching
 
 

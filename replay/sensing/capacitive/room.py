@@ -1,4 +1,4 @@
-"""The memory that one sum over a tree works in, made once for all poses."""
+"""The memory that a sum over a tree works in, made once for all poses; hard triangles have their own, see `Pieces`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import kernel
-from replay.sensing.capacitive.exact import SCRATCH
 from replay.sensing.capacitive.lanes import COLUMNS, LANES
 from replay.sensing.capacitive.part_queue import RULES, Queue, new_queue
-from replay.sensing.capacitive.triangle_pieces import Pieces, new_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,9 +26,6 @@ class Room(NamedTuple):
     lists: Ints  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
     batch: Ints  # (LANES,) what the lanes are about
     lanes: Floats  # (COLUMNS x LANES,)
-    triangle: Floats  # (3, 3) for the closed form
-    scratch: Floats  # SCRATCH, for the closed form
-    pieces: Pieces
 
 
 @kernel
@@ -45,7 +40,4 @@ def new_room(n: int) -> Room:
         np.empty((RULES + 1, max(n, RULES)), np.int64),
         np.empty(LANES, np.int64),
         np.zeros(COLUMNS * LANES),
-        np.empty((3, 3)),
-        np.empty(SCRATCH),
-        new_pieces(),
     )

@@ -53,6 +53,7 @@ from replay.sensing.capacitive.part_sum import sum_of_parts
 from replay.sensing.capacitive.placed_plate import PlacedPlate, placed_plate
 from replay.sensing.capacitive.room import Room, new_room
 from replay.sensing.capacitive.saturation import any_saturates, suspects
+from replay.sensing.capacitive.triangle_pieces import Pieces, new_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -85,7 +86,7 @@ def sum_tree(
     Returns:
         (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
     """
-    room = new_room(len(clusters.triangles))
+    room, pieces = new_room(len(clusters.triangles)), new_pieces()
     n, plates = len(T_plate_body), len(half_sizes)
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
     bound = np.zeros((n, plates))
@@ -94,19 +95,19 @@ def sum_tree(
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
             here = placed_plate(T_plate_body[frame, plate], half_x, half_y, both, facing, clusters.blur)
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _sum_one(
-                clusters, here, rtol, room, counts
+                clusters, here, rtol, room, pieces, counts
             )
     return integral, touching, bound
 
 
 @kernel
 def _sum_one(
-    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, counts: Ints
+    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Ints
 ) -> tuple[float, bool, float]:
     """Return the integral over a body [m], whether it touches the plate, and the bound of the error [m]."""
     triangles = clusters.triangles
     count = suspects(clusters, plate, room.stack, room.hard)
-    if count > 0 and any_saturates(triangles, room.hard, count, plate, room.triangle):
+    if count > 0 and any_saturates(triangles, room.hard, count, plate, pieces.triangle):
         return math.inf, True, 0.0
     empty(room.queue)
     budget, tally, lost = budget_of(clusters.nodes, plate, rtol), Tally(0.0, 0.0, 0.0, 0.0), 0.0
@@ -125,9 +126,9 @@ def _sum_one(
             several = min(count - begin, LANES)
             # half of the error is for triangles that have no rule; these may take half of what is left of it
             share = max(0.0, 0.5 * rtol * max(least, least_then) - spent) / (2.0 * several)
-            value, error, slow = sum_hard(triangles, plate, room, begin, several, share)
+            value, error, slow = sum_hard(triangles, room.hard, begin, several, plate, share, pieces, room.lanes)
             if slow > 0:
-                exact, touches = sum_exactly(triangles, plate, room, slow)
+                exact, touches = sum_exactly(triangles, plate, pieces, slow)
                 touching = touching or touches
                 if exact == math.inf:
                     _add_counts(counts, judged, 0, 0, alone)

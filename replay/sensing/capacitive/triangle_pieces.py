@@ -1,4 +1,4 @@
-"""Pieces of triangles in the plate's frame: the room for them, and how one is cut by z = 0, by a border, or in four.
+"""Pieces of triangles in the plate's frame: their memory, and how one is cut by z = 0, by a border, or in four.
 
 A piece is a row of a pool, laid out as a row of `Clusters.triangles`: its corners and its area, and which triangle it
 is of. The last piece is replaced by what becomes of it.
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 from replay.sensing.capacitive.clusters import CORNERS, SIZE
+from replay.sensing.capacitive.exact import SCRATCH
 from replay.sensing.capacitive.lanes import LANES
 from replay.sensing.capacitive.placed_plate import Triple
 
@@ -30,7 +31,7 @@ _POOL = LANES * (MOST_PIECES + 4)
 
 
 class Pieces(NamedTuple):
-    """Room for the pieces of up to LANES triangles, their owners."""
+    """Memory for up to LANES hard triangles, the owners, and their pieces; made once for all poses."""
 
     pool: Floats  # (_POOL, PIECE) pieces to judge
     done: Floats  # (3, 2 LANES, PIECE) pieces that are to be summed by 3, 7 and 16 points
@@ -43,11 +44,13 @@ class Pieces(NamedTuple):
     triangles: Ints  # (LANES,) which triangles the owners are
     slow: Ints  # (LANES,) triangles that need the closed form
     identity: Floats  # (4, 4) pieces are in the plate's frame
+    triangle: Floats  # (3, 3) a triangle for the closed form
+    scratch: Floats  # SCRATCH, of the closed form
 
 
 @kernel
 def new_pieces() -> Pieces:
-    """Return room for pieces."""
+    """Return memory for hard triangles and pieces."""
     return Pieces(
         np.empty((_POOL, PIECE)),
         np.empty((3, 2 * LANES, PIECE)),
@@ -60,6 +63,8 @@ def new_pieces() -> Pieces:
         np.empty(LANES, np.int64),
         np.empty(LANES, np.int64),
         np.eye(4),
+        np.empty((3, 3)),
+        np.empty(SCRATCH),
     )
 
 
