@@ -103,6 +103,7 @@ def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, 
     """
     T, half_x, half_y, both, blur = plate.T_plate_body, plate.half_x, plate.half_y, plate.both, plate.blur
     load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
+    # taken out of the loop by hand: the compiler cannot know that lanes and pose are different memory
     ex, ey, ez = (T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2])
     tx, ty, tz = T[0, 3], T[1, 3], T[2, 3]
     for i in range(padded(count)):

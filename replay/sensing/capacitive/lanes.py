@@ -23,8 +23,8 @@ COLUMNS = 52
 """Size of `lanes`: (COLUMNS x LANES,). Its first 40 columns hold a row of `Clusters.outlines`, `triangles` or
 `moments`, or of a pool of pieces, in the columns it has there."""
 
-CORNERS_FROM = 16
-"""First of nine columns beside a triangle's row: x, y, then z of its corners, as a point rule takes the distance."""
+FROM = 16
+"""First of nine columns beside a triangle's row: u, v and z [m] of its corners, as a point rule takes the distance."""
 
 FOUND = 40
 ERROR, SHIFT, LEAST, REGION = range(4)

@@ -1,7 +1,8 @@
 """The parts of a sum by their error per effort, worst first: a queue of buckets, half an octave each.
 
-Parts live in slots. A slot's row of `values` holds what was found of its part (see `lanes`), its row of
-`labels` what it is. The last that came into a bucket leaves it first, so that results repeat.
+A part is a tree node or a triangle whose share is known within an error. Parts live in slots. A slot's row of `values`
+holds what was found of its part (see `lanes`), its row of `labels` what it is. The last that came into a bucket leaves
+it first, so that results repeat.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ _ONE = int(np.float64(1.0).view(np.int64)) >> _SHIFT
 class Queue(NamedTuple):
     """Room for the parts of one sum."""
 
-    values: Floats  # (capacity, 4)
-    labels: Ints  # (capacity, 3)
+    values: Floats  # (capacity, 4) ERROR, SHIFT, LEAST and REGION, see `lanes`
+    labels: Ints  # (capacity, 3) PART, RULE and NEXT
     heads: Ints  # (256,) first slot of each bucket, or -1
     state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
 

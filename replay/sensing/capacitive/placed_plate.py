@@ -44,6 +44,7 @@ class PlacedPlate(NamedTuple):
 @kernel
 def placed_plate(T: Floats, half_x: float, half_y: float, both: bool, facing: bool, blur_of_body: float) -> PlacedPlate:
     """Return a plate at T_plate_body; `blur_of_body` [m] is how far off places are in the body's frame."""
+    # not inlined: what returns an array has to count references
     centre = (
         -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),

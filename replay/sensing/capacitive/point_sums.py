@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.sensing.capacitive.clusters import CORNERS, SIZE
-from replay.sensing.capacitive.lanes import CORNERS_FROM, LANES, SUM, padded
+from replay.sensing.capacitive.lanes import FROM, LANES, SUM, padded
 from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, place, sides_of
 
 Floats = NDArray[np.float64]
@@ -39,28 +39,24 @@ def sum_by_points(
         sx, sy = sides_of(lanes[region_column * LANES + i])
         keep_x, keep_y, shift_x, shift_y = abs(sx), abs(sy), sx * half_x, sy * half_y
         a, b, c = corner_in_lanes(T, lanes, 0, i), corner_in_lanes(T, lanes, 1, i), corner_in_lanes(T, lanes, 2, i)
-        lanes[CORNERS_FROM * LANES + i] = keep_x * a[0] - shift_x
-        lanes[(CORNERS_FROM + 1) * LANES + i] = keep_x * b[0] - shift_x
-        lanes[(CORNERS_FROM + 2) * LANES + i] = keep_x * c[0] - shift_x
-        lanes[(CORNERS_FROM + 3) * LANES + i] = keep_y * a[1] - shift_y
-        lanes[(CORNERS_FROM + 4) * LANES + i] = keep_y * b[1] - shift_y
-        lanes[(CORNERS_FROM + 5) * LANES + i] = keep_y * c[1] - shift_y
-        lanes[(CORNERS_FROM + 6) * LANES + i] = a[2]
-        lanes[(CORNERS_FROM + 7) * LANES + i] = b[2]
-        lanes[(CORNERS_FROM + 8) * LANES + i] = c[2]
+        lanes[FROM * LANES + i] = keep_x * a[0] - shift_x
+        lanes[(FROM + 1) * LANES + i] = keep_x * b[0] - shift_x
+        lanes[(FROM + 2) * LANES + i] = keep_x * c[0] - shift_x
+        lanes[(FROM + 3) * LANES + i] = keep_y * a[1] - shift_y
+        lanes[(FROM + 4) * LANES + i] = keep_y * b[1] - shift_y
+        lanes[(FROM + 5) * LANES + i] = keep_y * c[1] - shift_y
+        lanes[(FROM + 6) * LANES + i] = a[2]
+        lanes[(FROM + 7) * LANES + i] = b[2]
+        lanes[(FROM + 8) * LANES + i] = c[2]
         lanes[SUM * LANES + i] = 0.0
     for k in range(points.shape[1]):
         p, q, s, weight = points[0, k], points[1, k], points[2, k], points[3, k]
         for i in range(padded(count)):
-            x = (
-                p * lanes[CORNERS_FROM * LANES + i]
-                + q * lanes[(CORNERS_FROM + 1) * LANES + i]
-                + s * lanes[(CORNERS_FROM + 2) * LANES + i]
-            )
-            y = p * lanes[(CORNERS_FROM + 3) * LANES + i] + q * lanes[(CORNERS_FROM + 4) * LANES + i]
-            y += s * lanes[(CORNERS_FROM + 5) * LANES + i]
-            z = p * lanes[(CORNERS_FROM + 6) * LANES + i] + q * lanes[(CORNERS_FROM + 7) * LANES + i]
-            z += s * lanes[(CORNERS_FROM + 8) * LANES + i]
+            x = p * lanes[FROM * LANES + i] + q * lanes[(FROM + 1) * LANES + i] + s * lanes[(FROM + 2) * LANES + i]
+            y = p * lanes[(FROM + 3) * LANES + i] + q * lanes[(FROM + 4) * LANES + i]
+            y += s * lanes[(FROM + 5) * LANES + i]
+            z = p * lanes[(FROM + 6) * LANES + i] + q * lanes[(FROM + 7) * LANES + i]
+            z += s * lanes[(FROM + 8) * LANES + i]
             lanes[SUM * LANES + i] += weight / math.sqrt(x * x + y * y + z * z)
     for i in range(padded(count)):
         lanes[SUM * LANES + i] = lanes[SIZE * LANES + i] * lanes[SUM * LANES + i] + lanes[shift_column * LANES + i]
