@@ -43,7 +43,7 @@ def run(*, quick: bool = False, rounds: int | None = None, engines: Sequence[Eng
     several = (OURS, OURS_CHECKED, *PEERS) if engines is None else tuple(engines)
     rounds = rounds or (5 if quick else 9)
     report = Report("collision")
-    rows = easy(several, count=500 if quick else 1000, rounds=rounds)
+    rows = easy(several, count=200 if quick else 1000, rounds=rounds)
     report.tables["queries of unrelated pairs"] = rows
     report.tables["hard pairs, one call each (read the errors; the times are the calls')"] = hard(
         several, count=32 if quick else 64, rounds=1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,7 @@ class LinkPoses:
     linkage: Linkage
     local: Array
     world: Array
+    _chains: dict[tuple[int, ...], Array] = field(default_factory=dict, init=False, repr=False)
 
     def relative(self, a: int, b: int) -> Array:
         """Return T_a_b (n, 4, 4), pose of link b in link a, formed through their nearest common ancestor.
@@ -97,10 +98,14 @@ class LinkPoses:
         return LinkPoses(self.linkage, self.local[begin:end], self.world[begin:end])
 
     def _chain(self, links: Sequence[int]) -> Array:
-        pose = transforms.identity(len(self.local))
-        for link in reversed(links):
-            pose = transforms.compose(pose, self.local[:, link])
-        return pose
+        """Return the pose (n, 4, 4) of the first of some links, each the next one's child, in the last one's parent."""
+        key = tuple(links)
+        if key not in self._chains:  # many pairs of links share the way up of one
+            pose = transforms.identity(len(self.local))
+            for link in reversed(links):
+                pose = transforms.compose(pose, self.local[:, link])
+            self._chains[key] = pose
+        return self._chains[key]
 
 
 class Linkage:

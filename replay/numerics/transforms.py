@@ -24,17 +24,13 @@ def identity(*shape: int) -> Array:
 
 def compose(T_a_b: Array, T_b_c: Array) -> Array:
     """Return T_a_c = T_a_b T_b_c for rigid transforms of shape (..., 4, 4), broadcast against each other."""
-    shape = np.broadcast_shapes(T_a_b.shape, T_b_c.shape)
-    result = np.zeros(shape)
-    for row in range(3):
-        for column in range(4):
-            value = T_a_b[..., row, 0] * T_b_c[..., 0, column]
-            value = value + T_a_b[..., row, 1] * T_b_c[..., 1, column]
-            value = value + T_a_b[..., row, 2] * T_b_c[..., 2, column]
-            if column == 3:
-                value = value + T_a_b[..., row, 3]
-            result[..., row, column] = value
-    result[..., 3, 3] = 1.0
+    result = np.empty(np.broadcast_shapes(T_a_b.shape, T_b_c.shape))
+    rows = result[..., :3, :]
+    np.multiply(T_a_b[..., :3, 0, None], T_b_c[..., None, 0, :], out=rows)
+    rows += T_a_b[..., :3, 1, None] * T_b_c[..., None, 1, :]
+    rows += T_a_b[..., :3, 2, None] * T_b_c[..., None, 2, :]
+    rows[..., 3] += T_a_b[..., :3, 3]
+    result[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
     return result
 
 

@@ -25,6 +25,8 @@ _TITLES = {
     JOINTS: "Joint positions [rad, m]",
 }
 _VIEW_DIRECTION = np.array([1.1, -1.5, 0.75])
+_HALF_VIEW = np.tan(np.radians(55.0) / 2.0)  # the viewer's field of view
+_AROUND = 1.1  # room around the scene
 _BACKGROUND = (38, 42, 48)
 
 
@@ -78,11 +80,16 @@ def whole(container: Any) -> Any:
     return rrb.Blueprint(container, *closed, rrb.TimePanel(state="collapsed", timeline=TIMELINE), auto_views=False)
 
 
-def eye_of(low: Floats, high: Floats) -> Any:
-    """Return an eye that sees the box between two corners (3,) [m] in world coordinates."""
-    middle = 0.5 * (low + high)
-    distance = 0.85 * float(np.linalg.norm(high - low)) + 0.1
-    return eye_at(middle + distance * _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION), middle)
+def eye_of(points: Floats) -> Any:
+    """Return an eye that sees points (n, 3) [m] in world coordinates, in a view that is as wide as high."""
+    toward = _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION)
+    right = np.cross([0.0, 0.0, 1.0], toward) / np.hypot(*toward[:2])
+    axes = np.stack([right, np.cross(toward, right), toward])
+    seen = points @ axes.T
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    aside = np.abs(seen - middle)[:, :2].max(axis=1)
+    distance = float((seen[:, 2] - middle[2] + aside / _HALF_VIEW).max())
+    return eye_at(middle @ axes + (_AROUND * distance + 0.1) * toward, middle @ axes)
 
 
 def eye_at(position: Floats, target: Floats) -> Any:

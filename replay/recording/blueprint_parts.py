@@ -31,7 +31,7 @@ class RecordingBlueprint:
     """
 
     def __init__(self, charts: Collection[str], corners: Floats, end: int) -> None:
-        eye = blueprint.eye_of(corners.min(axis=0), corners.max(axis=0))
+        eye = blueprint.eye_of(corners)
         own = {_EYE: constants(eye), _AXIS: constants(blueprint.axis_until(end))}
         first = {"blueprint": _zero()}
         self._chunks = Chunks()
@@ -59,7 +59,7 @@ class _Recorder:
 @functools.cache
 def _parts(charts: frozenset[str]) -> Parts:
     recorder = _Recorder()
-    anywhere = blueprint.eye_of(np.zeros(3), np.ones(3))
+    anywhere = blueprint.eye_of(np.eye(3))
     blueprint.recording(charts, anywhere, blueprint.axis_until(1))._log_to_stream(recorder)
     return recorder.parts
 

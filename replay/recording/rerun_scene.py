@@ -83,18 +83,20 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
         link_poses: (L, 4, 4), T_world_link in one frame.
     """
+    spans = [(cone.link, cone.T_link_sensor[:3, 3][None]) for cone in scene.cones]
+    spans += [(plate.link, plate_corners(plate)) for plate in scene.plates]
     counts = np.diff(scene.meshes.first_vertex)
     bodies = [body for body, count in zip(scene.bodies, counts.tolist(), strict=True) if count]
-    if not bodies:
+    if bodies:
+        begins = scene.meshes.first_vertex[:-1][counts > 0]
+        low = np.minimum.reduceat(scene.meshes.vertices, begins)
+        high = np.maximum.reduceat(scene.meshes.vertices, begins)
+        solid = (high > low).all(axis=1)
+        boxes = np.where(_CORNERS, high[:, None], low[:, None])
+        spans += [(bodies[k].link, boxes[k]) for k in np.flatnonzero(solid if solid.any() else ~solid).tolist()]
+    if not spans:
         return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
-    begins = scene.meshes.first_vertex[:-1][counts > 0]
-    low = np.minimum.reduceat(scene.meshes.vertices, begins)
-    high = np.maximum.reduceat(scene.meshes.vertices, begins)
-    solid = (high > low).all(axis=1)
-    shown = solid if solid.any() else ~solid
-    box = np.where(_CORNERS, high[shown, None], low[shown, None])
-    links = np.array([body.link for body in bodies])[shown]
-    return transforms.apply(link_poses[links, None], box).reshape(-1, 3)
+    return np.concatenate([transforms.apply(link_poses[link], points) for link, points in spans])
 
 
 def _mesh(corners: Floats, normals: Floats, color: Color | None) -> list[Column]:

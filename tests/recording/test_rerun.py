@@ -14,11 +14,12 @@ from rerun.chunk import RrdReader
 
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
+from replay.recording.blueprint import eye_of
 from replay.recording.picture import picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
 from replay.recording.scene_view import BodyView, indexed
-from replay.recording.surfaces import cone_strips, corner_normals
+from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
 from tests.recording import moving
 
 FRAMES = 300
@@ -153,13 +154,32 @@ def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     floor = BodyView("room/floor", 1, sheet, (0, 0, 0, 255))
     nothing = BodyView("room/nothing", 1, np.zeros((0, 3, 3)), (0, 0, 0, 255))
     placed = [transforms.apply(poses[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies]
-    for bodies, points in (
-        ((floor, *scene.bodies, nothing), np.concatenate(placed)),
-        ((nothing, floor), sheet.reshape(-1, 3)),
-        ((nothing,), np.array([[-1.0, -1, 0], [1, 1, 1]])),
+    apexes = [(poses[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones]
+    corners = [transforms.apply(poses[plate.link], plate_corners(plate)) for plate in scene.plates]
+    bare = dataclasses.replace(scene, cones=(), plates=())
+    for view, bodies, points in (
+        (scene, (floor, *scene.bodies, nothing), [*placed, *apexes, *corners]),
+        (bare, (floor, *scene.bodies, nothing), placed),
+        (scene, (nothing,), [*apexes, *corners]),
+        (bare, (nothing, floor), [sheet.reshape(-1, 3)]),
+        (bare, (nothing,), [np.array([[-1.0, -1, 0], [1, 1, 1]])]),
     ):
-        shown = extent(dataclasses.replace(scene, bodies=bodies), poses)
-        assert np.allclose([shown.min(axis=0), shown.max(axis=0)], [points.min(axis=0), points.max(axis=0)])
+        shown, wanted = extent(dataclasses.replace(view, bodies=bodies), poses), np.concatenate(points)
+        assert np.allclose([shown.min(axis=0), shown.max(axis=0)], [wanted.min(axis=0), wanted.max(axis=0)])
+
+
+@pytest.mark.parametrize("size", [(12.0, 0.2, 0.2), (0.2, 0.2, 8.0), (1.0, 2.0, 3.0), (0.3, 0.3, 0.01)])
+def test_the_first_picture_is_filled_by_what_it_shows(size: tuple[float, float, float]) -> None:
+    points = 5.0 + np.random.default_rng(7).uniform(-1.0, 1.0, (30, 3)) * size
+    eye = eye_of(points)
+    position, target = (part.as_arrow_array().to_pylist()[0] for part in (eye.position, eye.look_target))
+    ahead = np.subtract(target, position)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    axes = np.stack([right, np.cross(right, ahead), ahead])
+    seen = (points - position) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
+    edge = np.tan(np.radians(55.0 / 2))  # the viewer's field of view
+    filled = np.abs(seen[:, :2] / seen[:, 2:]).max() / edge
+    assert (seen[:, 2] > 0.0).all() and 0.75 < filled < 0.95
 
 
 def test_cones_have_their_aperture_and_range() -> None:

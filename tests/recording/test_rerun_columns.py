@@ -99,7 +99,7 @@ def test_a_blueprint_made_of_parts_is_the_librarys(charts: tuple[str, ...], tmp_
     found = []
     for k, corners in enumerate((RNG.normal(size=(5, 3)), 10.0 * RNG.normal(size=(5, 3)))):
         end = 1_000_000_000 * (k + 2)
-        eye = blueprint.eye_of(corners.min(axis=0), corners.max(axis=0))
+        eye = blueprint.eye_of(corners)
         described = blueprint.recording(charts, eye, blueprint.axis_until(end))
         mine = contents(tmp_path / "mine.rrd", RecordingBlueprint(charts, corners, end))
         assert mine == contents(tmp_path / "theirs.rrd", described)

@@ -125,14 +125,17 @@ class DistanceSuite:
         """
         frames = len(poses.local)
         columns = empty_columns(frames, len(self.sensors))
+        relative: dict[tuple[int, int], Array] = {}
         for column, sensor in enumerate(self.sensors):
             nearest = nothing_yet(frames)
             T_target_sensor: dict[int, Array] = {}
             for index, target in enumerate(self.targets):
                 if not sensor.sees(target):
                     continue
-                pose = transforms.compose(poses.relative(target.link, sensor.link), sensor.T_link_sensor)
-                T_target_sensor[index] = np.ascontiguousarray(pose)
+                links = (target.link, sensor.link)
+                if links not in relative:
+                    relative[links] = poses.relative(*links)
+                T_target_sensor[index] = transforms.compose(relative[links], sensor.T_link_sensor)
                 self.counters.readings += frames
                 self.counters.triangles += frames * len(target.triangles)
                 if self._savings:
