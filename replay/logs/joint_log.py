@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-import json
+import itertools
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import mcap.records
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import RecordingError
+from replay.logs.joint_messages import decoder
 from replay.logs.mcap_reader import McapLog
-from replay.logs.mcap_records import Channel, Schema
-from replay.logs.protobuf import message_type
 
 DEFAULT_TOPIC = "/joint_states"
 
@@ -30,19 +28,21 @@ class JointTrack:
     """One joint of a log.
 
     Attributes:
-        time: (n,) int64 [ns] as the log counts it, in the order of the log.
+        time: (n,) int64 [ns] as the log counts it, in the order of the log; channel by channel if there are several.
         position: (n,) in the log's unit.
+        by_turns: whether several channels of the topic give samples of it at the same time: several publishers.
     """
 
     time: NDArray[np.int64]
     position: NDArray[np.float64]
+    by_turns: bool = False
 
 
 def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str, JointTrack]:
     """Return the joints of an MCAP log by name.
 
     Understood are `foxglove.JointStates` (protobuf or JSON) and `sensor_msgs/msg/JointState` (CDR or JSON). The time of
-    a sample is its message's own stamp or, where that is zero, the log time.
+    a sample is its message's own stamp or, where no message of its channel has one (all are zero), the log time.
 
     Args:
         name: of the file, for messages.
@@ -53,10 +53,11 @@ def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str
         RecordingError: the file is not a whole MCAP file, has no such topic, or the topic is of another kind; or a
             time is beyond 146 years.
     """
-    found: dict[str, tuple[list[int], list[float]]] = {}
+    found: dict[str, dict[int, _Samples]] = {}
+    stamped: set[int] = set()  # a simulated clock begins at zero: one such stamp is no missing one
     with McapLog(name, data=data) as log:
         decoders = {
-            channel.id: _decoder(name, channel, log.schemas.get(channel.schema_id))
+            channel.id: decoder(name, channel, log.schemas.get(channel.schema_id))
             for channel in log.channels.values()
             if channel.topic == topic
         }
@@ -65,15 +66,21 @@ def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str
                 if run.channel not in decoders:
                     continue
                 for time, message in zip(run.time.tolist(), run.messages(), strict=True):
-                    stamp, joints = _decode(name, topic, decoders[run.channel], message)
+                    stamp, joints = decoders[run.channel](message)
+                    if stamp:
+                        stamped.add(run.channel)
                     for joint, position in joints:
-                        times, positions = found.setdefault(joint, ([], []))
-                        times.append(stamp or time)
-                        positions.append(position)
+                        channels = found.setdefault(joint, {})
+                        channels.setdefault(run.channel, _Samples()).add(stamp, time, position)
         topics = sorted({channel.topic for channel in log.channels.values()})
+    if topic not in topics:
+        raise RecordingError(name, f"has no topic {topic!r}; its topics are {topics}")
     if not found:
-        raise RecordingError(name, f"has no joint states on topic {topic!r}; its topics are {topics}")
-    return {joint: JointTrack(_times(name, t), np.array(p)) for joint, (t, p) in sorted(found.items())}
+        raise RecordingError(name, f"has no message with positions of joints on topic {topic!r}")
+    return {
+        joint: _joined(samples.track(name, channel in stamped) for channel, samples in channels.items())
+        for joint, channels in sorted(found.items())
+    }
 
 
 def _times(name: str, times: list[int]) -> NDArray[np.int64]:
@@ -83,71 +90,32 @@ def _times(name: str, times: list[int]) -> NDArray[np.int64]:
     return np.array(times, dtype=np.int64)
 
 
-Sample = tuple[int, list[tuple[str, float]]]
-"""Stamp [ns], 0 for none, and the joints with a position."""
-Decoder = Callable[[bytes], Sample]
+class _Samples:
+    """The samples of one joint from one channel, in the order of the log."""
+
+    def __init__(self) -> None:
+        self._stamps: list[int] = []
+        self._times: list[int] = []
+        self._positions: list[float] = []
+
+    def add(self, stamp: int, time: int, position: float) -> None:
+        """Take the next one: stamp [ns], log time [ns] and position."""
+        self._stamps.append(stamp)
+        self._times.append(time)
+        self._positions.append(position)
+
+    def track(self, name: str, stamped: bool) -> JointTrack:
+        """Return the samples of log `name` at their stamps, or at their log times."""
+        return JointTrack(_times(name, self._stamps if stamped else self._times), np.array(self._positions))
 
 
-def _decoder(name: str, channel: Channel, schema: Schema | None) -> Decoder:
-    """Return what turns the messages of a channel into samples."""
-    kind, encoding = schema.name if schema is not None else "", channel.encoding
-    if encoding == "json":
-        return _json
-    if schema is not None and encoding == "protobuf" and kind == "foxglove.JointStates":
-        type_ = message_type(name, schema.name, schema.data)
-        return lambda data: _foxglove(type_.FromString(data))
-    if schema is not None and encoding == "cdr" and kind in ("sensor_msgs/msg/JointState", "sensor_msgs/JointState"):
-        return _ros_decoder(mcap.records.Schema(channel.schema_id, schema.data, schema.encoding, schema.name))
-    raise RecordingError(
-        name,
-        f"topic {channel.topic!r} holds {kind or 'messages without schema'} as {encoding or 'bytes'}; read are"
-        " foxglove.JointStates (protobuf, json) and sensor_msgs/msg/JointState (cdr, json)",
+def _joined(tracks: Iterable[JointTrack]) -> JointTrack:
+    """Return what several channels say of one joint, one channel after the other."""
+    parts = sorted(tracks, key=lambda track: int(track.time.min()))
+    by_turns = any(later.time.min() <= earlier.time.max() for earlier, later in itertools.pairwise(parts))
+    return JointTrack(
+        np.concatenate([part.time for part in parts]), np.concatenate([part.position for part in parts]), by_turns
     )
-
-
-def _ros_decoder(schema: mcap.records.Schema) -> Decoder:
-    from mcap_ros2.decoder import DecoderFactory
-
-    decode: Any = None
-
-    def sample(data: bytes) -> Sample:
-        nonlocal decode
-        decode = decode or DecoderFactory().decoder_for("cdr", schema)
-        return _ros(decode(data))
-
-    return sample
-
-
-def _decode(name: str, topic: str, decoder: Decoder, message: bytes) -> Sample:
-    try:
-        return decoder(message)
-    except Exception as error:  # each format's library fails in ways of its own on bytes that are not its messages
-        reason = f"topic {topic!r} holds a message that is no joint state: {str(error) or type(error).__name__}"
-        raise RecordingError(name, reason) from None
-
-
-def _foxglove(message: Any) -> Sample:
-    stamp = message.timestamp.seconds * 1_000_000_000 + message.timestamp.nanos
-    return stamp, [(joint.name, joint.position) for joint in message.joints if joint.HasField("position")]
-
-
-def _ros(message: Any) -> Sample:
-    stamp = message.header.stamp
-    nanoseconds = stamp.nanosec if hasattr(stamp, "nanosec") else stamp.nanosecond
-    positions = [float(position) for position in message.position]
-    return stamp.sec * 1_000_000_000 + nanoseconds, list(zip(message.name, positions, strict=bool(positions)))
-
-
-def _json(data: bytes) -> Sample:
-    message = json.loads(data)
-    if "joints" in message:
-        stamp = message.get("timestamp") or {}
-        joints = [(joint["name"], float(joint["position"])) for joint in message["joints"] if "position" in joint]
-    else:
-        stamp = (message.get("header") or {}).get("stamp") or {}
-        joints = list(zip(message["name"], map(float, message["position"]), strict=bool(message["position"])))
-    fraction = next((stamp[key] for key in ("nsec", "nanosec", "nanos") if key in stamp), 0)
-    return int(stamp.get("sec", stamp.get("seconds", 0))) * 1_000_000_000 + int(fraction), joints
 
 
 def read_csv(

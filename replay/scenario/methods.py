@@ -24,8 +24,8 @@ METHOD_REVISIONS: Final = {
     "distance.exact": 1,
     "distance.rays": 1,
     "distance.thesis": 1,
-    "capacitive.tree": 2,
-    "capacitive.exact": 1,
+    "capacitive.tree": 3,
+    "capacitive.exact": 2,
     "capacitive.midpoint": 1,
 }
 """Bumped when a method's results change beyond the shipped rules; recorded with every result."""

@@ -126,6 +126,9 @@ def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str,
     if source.unit is not None and source.unit not in dimension.units:
         rule = f"is no unit of joint {joint!r}, which is {mine[joint]}; units are {', '.join(dimension.units)}"
         raise Unusable((*path, "unit"), rule)
+    if log[source.name].by_turns:
+        rule = "is moved by several publishers on one topic of the log, sample by sample in turn; keep one in the log"
+        raise Unusable(path, rule)
     factor = 1.0 if source.unit is None else float(dimension.units[source.unit])
     time, position = log[source.name].time, log[source.name].position * factor
     if not np.isfinite(position).all():

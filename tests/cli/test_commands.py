@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import rerun as rr
 
 import replay
 import replay.batch.run
@@ -66,7 +67,7 @@ def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys)
     before = (recorded / "swing.mcap").read_bytes()
     assert run(["run", str(scenario), "-o", str(recorded.parent)]) is ExitCode.INVALID
     assert "exists already; pass --overwrite" in capsys.readouterr().err
-    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite", "--no-rrd"]) is ExitCode.FINE
+    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite"]) is ExitCode.FINE
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
 
@@ -325,9 +326,10 @@ def test_an_interrupted_run_leaves_no_half_recordings(tmp_path, number):
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 def test_the_viewer_does_not_outlive_the_command(tmp_path):
     viewer = tmp_path / "viewer"
-    viewer.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
+    viewer.write_text(f"#!/bin/sh\necho $@ > {tmp_path}/arguments\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
     viewer.chmod(0o700)
-    (tmp_path / "a.rrd").write_bytes(b"")
+    with rr.RecordingStream("replay") as stream:
+        stream.save(tmp_path / "a.rrd")
     code = (
         "import pathlib, replay.recording.viewer as v; from replay.cli.main import main;"
         f"v.viewer_binary = lambda: pathlib.Path({str(viewer)!r}); main(['view', {str(tmp_path / 'a.rrd')!r}])"
@@ -339,6 +341,7 @@ def test_the_viewer_does_not_outlive_the_command(tmp_path):
             time.sleep(0.05)
         process.terminate()
         assert process.wait(timeout=30.0) == ExitCode.INTERRUPTED
+    assert (tmp_path / "arguments").read_text().split() == [str(tmp_path / "a.rrd"), "--bind", "127.0.0.1"]
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)
 

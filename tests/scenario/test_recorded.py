@@ -71,23 +71,33 @@ def ros_json(stamp_ns: int, joints: dict[str, float]) -> bytes:
 
 
 EPOCH = 1_700_000_000_123_456_789  # [ns]
+NANOSECONDS = [round(second * 1e9) for second in SECONDS]
+JOINTS = [{"j1": swing, "lift": lift} for swing, lift in zip(SWING, LIFT, strict=True)]
 
 
-def log(kind: str, topic: str = "/joint_states", epoch: int = EPOCH) -> bytes:
-    """A robot's log that begins at an odd epoch, with every sample of both joints."""
+def written(kind: str, messages: list[tuple[int, int, bytes]], description: str = "ros2msg") -> bytes:
+    """A log of messages with joint states: channel, log time [ns] and bytes of each."""
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.start()
-    schema = writer.register_schema(
-        "sensor_msgs/msg/JointState", "ros2msg" if kind == "cdr" else "jsonschema", ROS.encode()
-    )
-    channel = writer.register_channel(topic, kind, schema)
-    encode = cdr if kind == "cdr" else ros_json
-    for second, swing, lift in zip(SECONDS, SWING, LIFT, strict=True):
-        stamp = epoch + round(second * 1e9)
-        writer.add_message(channel, 5, encode(stamp, {"j1": swing, "lift": lift}), 5)
+    name = "sensor_msgs/msg/JointState"
+    schema = writer.register_schema(name, description if kind == "cdr" else "jsonschema", ROS.encode())
+    channels = [writer.register_channel("/joint_states", kind, schema) for _ in range(2)]
+    for channel, time, data in messages:
+        writer.add_message(channels[channel], time, data, time)
     writer.finish()
     return stream.getvalue()
+
+
+def log(kind: str, epoch: int = EPOCH) -> bytes:
+    """A robot's log that begins at an odd epoch, with every sample of both joints."""
+    encode = cdr if kind == "cdr" else ros_json
+    return written(kind, [(0, 5, encode(epoch + at, joints)) for at, joints in zip(NANOSECONDS, JOINTS, strict=True)])
+
+
+def json_log(*messages: object) -> dict[str, bytes]:
+    """A log of JSON messages, one a second."""
+    return {"robot.mcap": written("json", [(0, k * 10**9, json.dumps(m).encode()) for k, m in enumerate(messages)])}
 
 
 def load(tmp_path, motion, files=()):
@@ -113,6 +123,39 @@ def test_a_robots_log_moves_the_joints(tmp_path, kind):
     scenario = load(tmp_path, motion, {"robot.mcap": log(kind)})
     np.testing.assert_allclose(positions(scenario), EXPECTED, atol=ATOL)
     assert "robot.mcap" in scenario.sources
+
+
+@pytest.mark.parametrize("stamps", ["of a simulated clock", "missing", "as rosbridge names them"])
+def test_samples_stand_at_their_stamps_or_without_any_at_their_log_times(tmp_path, stamps):
+    messages = []
+    for at, joints in zip(NANOSECONDS, JOINTS, strict=True):
+        if stamps == "of a simulated clock":  # it begins at zero, and the log goes by another clock
+            messages.append((0, EPOCH + 3 * at, ros_json(at, joints)))
+        elif stamps == "missing":
+            messages.append((0, EPOCH + at, ros_json(0, joints)))
+        else:
+            data = ros_json(EPOCH + at, joints).replace(b'"nanosec"', b'"nsecs"').replace(b'"sec"', b'"secs"')
+            messages.append((0, EPOCH + 3 * at, data))
+    motion = "{recorded: {file: robot.mcap, joints: {swing: {name: j1, unit: deg}, lift: {name: lift}}}}"
+    got = positions(load(tmp_path, motion, {"robot.mcap": written("json", messages)}))
+    np.testing.assert_allclose(got, EXPECTED, atol=ATOL)
+
+
+def test_two_publishers_may_share_a_topic_but_not_a_joint(tmp_path):
+    both = zip(NANOSECONDS, JOINTS, strict=True)
+    parts = [(at, channel, {name: joints[name]}) for at, joints in both for channel, name in enumerate(("j1", "lift"))]
+    shared = written("cdr", [(channel, at, cdr(EPOCH + at, joint)) for at, channel, joint in parts])
+    motion = "{recorded: {file: robot.mcap, joints: {swing: {name: j1, unit: deg}, lift: {name: lift}}}}"
+    np.testing.assert_allclose(positions(load(tmp_path, motion, {"robot.mcap": shared})), EXPECTED, atol=ATOL)
+    in_turn = written("cdr", [(k % 2, at, cdr(EPOCH + at, JOINTS[k])) for k, at in enumerate(NANOSECONDS)])
+    with pytest.raises(ScenarioError, match="moved by several publishers"):
+        load(tmp_path, motion, {"robot.mcap": in_turn})
+    one_after_the_other = written(
+        "cdr", [(int(k < 3), at, cdr(EPOCH + at, JOINTS[k])) for k, at in enumerate(NANOSECONDS)]
+    )
+    np.testing.assert_allclose(
+        positions(load(tmp_path, motion, {"robot.mcap": one_after_the_other})), EXPECTED, atol=ATOL
+    )
 
 
 def test_a_csv_moves_the_joints_and_empty_cells_are_no_samples(tmp_path):
@@ -157,7 +200,11 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
     [
         ("{recorded: {file: none.mcap}}", {}, "does not exist"),
         ("{recorded: {file: log.txt}}", {"log.txt": b""}, "neither a .mcap nor a .csv"),
-        ("{recorded: {file: robot.mcap, topic: /joints}}", {}, "no joint states on topic '/joints'"),
+        (
+            "{recorded: {file: robot.mcap, topic: /joints}}",
+            {},
+            "has no topic '/joints'; its topics are ['/joint_states']",
+        ),
         ("{recorded: {file: robot.mcap, time: {unit: ms}}}", {}, "has no effect with a .mcap"),
         ("{recorded: {file: log.csv, topic: /x}}", {}, "has no effect with a .csv"),
         ("{recorded: {file: cut.mcap}}", {"cut.mcap": log("cdr")[:-40]}, "damaged: its end is missing"),
@@ -193,6 +240,46 @@ GOOD = {"robot.mcap": log("cdr"), "log.csv": b"time,swing\n0,0\n0.5,1\n"}
             "{recorded: {file: log.csv}}",
             {"log.csv": b"time,swing\n1,0\n1,1\n"},
             "times in the log that do not increase",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            {"robot.mcap": written("cdr", [(0, 0, cdr(0, {"swing": 1.0}))], "ros2idl")},
+            "as cdr with a schema in ros2idl; read are",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"name": ["swing"], "position": []}),
+            "no message with positions of joints on topic '/joint_states'",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"name": ["swing", "lift"], "position": [1.0]}),
+            "it names 2 joints and gives 1 positions",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"header": {"stamp": {"sec": 1.25}}, "name": ["swing"], "position": [1.0]}),
+            "its time stamp has 1.25, no whole number",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"timestamp": "2023-11-14T22:13:20Z", "joints": [{"name": "swing", "position": 1.0}]}),
+            'its time stamp is "2023-11-14T22:13:20Z", no JSON object',
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"header": {"stamp": {"ticks": 7}}, "name": ["swing"], "position": [1.0]}),
+            "its time stamp has 'ticks' where 'sec' and 'nanosec' are read",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"name": ["swing"], "position": [True]}),
+            "a position is true, no number",
+        ),
+        (
+            "{recorded: {file: robot.mcap}}",
+            json_log({"name": ["swing"], "position": ["NaN"]}),
+            "no finite number: sample 0",
         ),
         ("{recorded: {file: log.csv}}", {"log.csv": b"time\n\xff\xfe"}, "line 2: byte 0xff is not UTF-8"),
         ("{recorded: {file: log.csv}}", {"log.csv": b""}, "has no headings in its first line"),

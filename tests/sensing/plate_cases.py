@@ -29,6 +29,7 @@ FAMILIES = [
     "sliver_across",
     "small_plate",
     "both_crossing",
+    "edge_over_corner",
 ]
 
 
@@ -91,9 +92,24 @@ def case(family: str, rng: np.random.Generator) -> Case:
     elif family == "vertex_on_border":
         p[0, 2] = 0.0
         p[0, k], p[0, 1 - k] = border, rng.uniform(-1, 1) * half[1 - k]
+    elif family == "edge_over_corner":
+        p = before_a_corner(half, rng)
     elif family == "small_plate":
         half = half * 10 ** rng.uniform(-3, -1)
     return p[rng.permutation(3)], half, side
+
+
+def before_a_corner(half: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return a triangle parallel to the plate but for last digits, an edge of which passes before corners of it.
+
+    So stand the walls and boxes of scenes before a plate that looks along an axis.
+    """
+    corner = half * rng.choice([-1, 1], 2)
+    near, far = rng.choice([5.0, 7.0, 10.0, 13.0], 2)
+    p = np.full((3, 3), rng.uniform(0.2, 2.0) * half.max() * near)
+    p[0, :2], p[1, :2] = near * corner, -far * corner
+    p[2, :2] = p[0, 0], p[1, 1]
+    return p + np.spacing(p) * rng.integers(-1, 2, (3, 3))
 
 
 def _turn(rng: np.random.Generator) -> NDArray[np.float64]:

@@ -100,6 +100,15 @@ def _covered(triangle, sign, half, scratch) -> float:
     return total
 
 
+def test_a_wall_before_a_plate_that_looks_along_an_axis():
+    # the diagonal of the wall passes before two corners of the plate, and the wall leans by the last digit: of a piece
+    # that only rounding made, the share of the area was 0.45
+    wall = [[-0.5, -0.49999999999999994, 0.84], [-0.5, 0.49999999999999994, 0.84]]
+    wall.append([0.49999999999999994, 0.49999999999999994, 0.8400000000000001])
+    expected = float(plate_reference.plate_integral(wall, [0.05, 0.05], "front"))
+    assert plate_integral([wall], [0.05, 0.05])[0] == pytest.approx(expected, rel=1e-15)
+
+
 def test_a_triangle_cut_along_the_borders_is_the_sum_of_its_parts():
     # x = 1, y from -2 to 2, cut by hand at the corners of the cells
     whole = [[1, -2, 1], [1, 2, 1], [1, 0, 2]]

@@ -2,7 +2,7 @@
 
 A share is taken from barycentric coordinates, which lose nothing however small the triangle is against its place, or
 from the distances beyond the borders and z, which lose nothing however small the piece is against the triangle: areas
-projected on one plane have the ratio of the areas. The one with the smaller bound of its rounding is taken.
+projected on one plane have the ratio of the areas. The share with the smallest bound of its rounding is taken.
 """
 
 from __future__ import annotations
@@ -38,22 +38,20 @@ def share(piece: Floats, a: int, b: int, c: int, triangle: Floats) -> float:
         first = SHARE_A
     elif in_c >= in_a:
         second = SHARE_A
-    result, error = _parallelogram(piece, a, b, c, first, second)
-    if error <= _PLENTY * result:
+    result, bound = _parallelogram(piece, a, b, c, first, second)
+    if bound <= _PLENTY * result:
         return result
     east = _nearer(piece, a, b, c, EAST)
     north = _nearer(piece, a, b, c, NORTH)
-    best, axis = error / result if result > 0.0 else 1.0, -1
-    area = 0.0
-    for k in range(3):
-        u, v = (north, HEIGHT) if k == 0 else ((HEIGHT, east) if k == 1 else (east, north))
+    for axis in range(3):
+        u, v = (north, HEIGHT) if axis == 0 else ((HEIGHT, east) if axis == 1 else (east, north))
         projected, error = _parallelogram(piece, a, b, c, u, v)
-        if projected > 0.0 and error < best * projected:
-            best, axis, area = error / projected, k, projected
-    if axis < 0:
-        return result
-    whole = _projected(triangle, axis)
-    return area / whole if whole > 0.0 else result
+        if projected > 0.0:
+            # bounds of shares: seen edge-on, the whole triangle is no larger than the rounding of a piece either
+            whole = _projected(triangle, axis)
+            if error < bound * whole:
+                result, bound = projected / whole, error / whole
+    return result
 
 
 @kernel
