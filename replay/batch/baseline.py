@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import append_lines, write_error
 from replay.recording.reader import read_provenance
@@ -52,6 +53,7 @@ class Baseline:
             RecordingError: a recording cannot be read; nothing is changed then.
             WriteError: the folder cannot be written.
         """
+        new, stored = not self.directory.exists(), False
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             staging = Path(tempfile.mkdtemp(prefix=".staging-", dir=self.directory))
@@ -75,14 +77,25 @@ class Baseline:
                 "scenarios": {name: entry.what for name, entry in entries.items()},
             }
             append_lines(self.directory / LOG, [json.dumps(line, ensure_ascii=False)])
+            stored = True
         except OSError as error:
             raise write_error(self.directory, error) from None
         finally:
             shutil.rmtree(staging, ignore_errors=True)
+            if not stored:
+                self._undo(new)
         self._remove_unneeded()
 
     def _path(self, name: str) -> Path:
         return self.directory / name / f"{name}.mcap"
+
+    def _undo(self, new: bool) -> None:
+        """Remove the meshes of recordings that were not stored, and the folders that are empty without them."""
+        with contextlib.suppress(RecordingError, OSError):
+            self._remove_unneeded()
+            (self.directory / OBJECTS).rmdir()
+            if new:
+                self.directory.rmdir()
 
     def _remove_unneeded(self) -> None:
         needed: set[str] = set()

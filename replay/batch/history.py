@@ -27,10 +27,11 @@ def read_history(path: Path) -> list[Night]:
     nights = []
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
     except (OSError, UnicodeDecodeError) as error:
-        raise WriteError(str(path), f"it cannot be read before it is appended to: {error}") from None
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise WriteError(str(path), f"it cannot be read before it is appended to: {reason}") from None
     for line in lines:
         try:
             entry: dict[str, Any] = json.loads(line)
@@ -39,6 +40,13 @@ def read_history(path: Path) -> list[Night]:
         except (KeyError, TypeError, ValueError):
             continue
     return nights
+
+
+def check_history(path: Path | None) -> None:
+    """Raise the WriteError now, before the night, that reading or appending would raise after it."""
+    if path is not None:
+        read_history(path)
+        append_lines(path, [])
 
 
 def append_night(path: Path, night: Night) -> None:

@@ -12,6 +12,7 @@ from typing import Literal
 
 from replay.batch.baseline import Baseline, Entry
 from replay.batch.case import CaseResult, Status
+from replay.batch.history import check_history
 from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, Verdict
 from replay.batch.run import Execution, Run, run_all
 from replay.batch.select import Selection
@@ -22,7 +23,7 @@ from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.rules import Rules
 from replay.comparison.runs import Case, Pair, diff_pair, read_pair
-from replay.errors import NoSpaceError, RecordingError, WriteError
+from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -41,6 +42,7 @@ def regress(
     rrd: Rrd = "failing",
     model: Model | None = None,
     model_name: str = "",
+    history: Path | None = None,
     execution: Execution | None = None,
     watch: Watch | None = None,
 ) -> Regression:
@@ -56,12 +58,17 @@ def regress(
         rrd: which scenarios get rerun recordings; those that differ also get one that shows both runs.
         model: replaces the scenarios' own models.
         model_name: how the user named it, for reports.
+        history: file that the reports will append to, to find out now that it cannot be.
         execution, watch: as of `run_all`.
 
     Raises:
+        InvalidValue: the baseline is a file.
         WriteError: a folder cannot be written.
         WorkerError: worker processes cannot be started.
     """
+    if baseline.is_file():
+        raise InvalidValue("--baseline", baseline, "is a file; give the folder that `replay accept` writes")
+    check_history(history)
     accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
     _forget(directory, [scenario.name for scenario in selection.chosen])
     run = run_all(

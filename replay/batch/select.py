@@ -45,7 +45,8 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
                 raise InvalidValue("SCENARIO", path, "holds no scenario: no *.yaml file with a top-level `version` key")
             found.update(dict.fromkeys(scenarios))
         else:
-            raise InvalidValue("SCENARIO", path, "is not there; give a scenario file, a recording, or a folder")
+            what = "is neither a file nor a folder" if path.exists() else "is not there"
+            raise InvalidValue("SCENARIO", path, f"{what}; give a scenario file, a recording, or a folder")
     return list(found)
 
 

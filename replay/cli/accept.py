@@ -11,11 +11,12 @@ import click
 from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import note
+from replay.cli.values import PathName
 
 
 @click.command()
-@click.argument("rundir", type=click.Path(path_type=Path))
-@click.option("--baseline", type=click.Path(path_type=Path), required=True, help="Folder of accepted recordings.")
+@click.argument("rundir", type=PathName())
+@click.option("--baseline", type=PathName(), required=True, help="Folder of accepted recordings.")
 @click.option("--reason", default="", help="Why the results are right now; kept in the baseline's log.")
 @click.option("--yes", is_flag=True, help="Do not ask.")
 def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:

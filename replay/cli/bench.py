@@ -10,6 +10,7 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, say
+from replay.cli.values import PathName
 
 BENCHMARKS = (
     *("collision", "distance", "capacitive", "pipeline", "savings"),
@@ -23,7 +24,7 @@ BENCHMARKS = (
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=PathName(),
     default=Path("recordings/bench"),
     show_default=True,
     help="Folder for bench.json, bench.html and bench.png.",

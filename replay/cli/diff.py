@@ -9,8 +9,9 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, say
+from replay.cli.values import PathName
 
-FILE = click.Path(path_type=Path)
+FILE = PathName()
 
 
 @click.command()

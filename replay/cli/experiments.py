@@ -8,8 +8,9 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, say
+from replay.cli.values import PathName
 
-FOLDER = click.Path(path_type=Path)
+FOLDER = PathName()
 
 
 @click.command()

@@ -9,19 +9,18 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import note
+from replay.cli.values import PathName
 
 if TYPE_CHECKING:
     from replay.recording.export import Format
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path))
+@click.argument("recording", type=PathName())
 @click.option(
     "--format", "form", type=click.Choice(["csv", "json", "parquet"]), required=True, help="Form of the files."
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Folder for the files; the recording's own when left out."
-)
+@click.option("-o", "--output", type=PathName(), help="Folder for the files; the recording's own when left out.")
 @click.option("--topic", "topics", multiple=True, metavar="GLOB", help="Only topics that match; repeatable.")
 @click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 def export(recording: Path, form: Format, output: Path | None, topics: tuple[str, ...], overwrite: bool) -> ExitCode:

@@ -8,10 +8,11 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, say
+from replay.cli.values import PathName
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path))
+@click.argument("recording", type=PathName())
 @format_option
 def info(recording: Path, form: str) -> ExitCode:
     """Say what RECORDING (.mcap, or the .mcap.part of a stopped run) holds: topics, counts, provenance.

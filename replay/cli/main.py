@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import importlib
 import io
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -102,7 +104,8 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except click.ClickException as error:
         context = error.ctx if isinstance(error, click.UsageError) else None
         hint = f"; see {context.command_path} --help" if context else ""
-        click.echo(f"replay: error: {error.format_message().rstrip('.')}{hint}", err=True)
+        message = " ".join(error.format_message().split()).rstrip(".")
+        click.echo(f"replay: error: {message}{hint}", err=True)
         return ExitCode.INVALID
     except ReplayError as error:
         lines = str(error).splitlines()
@@ -117,8 +120,18 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except BrokenPipeError:
         sys.stderr.close()  # nobody reads on; Python would complain about it at exit
         return ExitCode.FINE
+    except OSError as error:
+        if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+            return _fault(error)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left of the result would fail once more at exit
+        click.echo(f"replay: error: the result cannot be written to standard output: {error.strerror}", err=True)
+        return ExitCode.INVALID
     except Exception as error:  # Python's own exit code for it is 1, which here means "different"
-        traceback.print_exc()
-        click.echo(f"replay: error: this is a fault of replay: {type(error).__name__}: {error}", err=True)
-        return ExitCode.FAILED
+        return _fault(error)
     return result if isinstance(result, ExitCode) else ExitCode.FINE
+
+
+def _fault(error: Exception) -> ExitCode:
+    traceback.print_exc()
+    click.echo(f"replay: error: this is a fault of replay: {type(error).__name__}: {error}", err=True)
+    return ExitCode.FAILED

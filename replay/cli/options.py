@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.values import Memory, Seconds, ShardOf, Workers
+from replay.cli.values import Memory, PathName, Seconds, ShardOf, Workers
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-scenarios_argument = click.argument("scenarios", nargs=-1, required=True, type=click.Path(path_type=Path))
+scenarios_argument = click.argument("scenarios", nargs=-1, required=True, type=PathName())
 model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model, not the scenarios' own.")
 select_option = click.option(
     "--select",
@@ -42,7 +42,7 @@ _EXECUTION = (
 
 def output_option(default: str) -> Callable[[Command], Command]:
     """Return the option for the run folder."""
-    kind = click.Path(path_type=Path)
+    kind = PathName()
     return click.option("-o", "--output", type=kind, default=Path(default), show_default=True, help="Run folder.")
 
 
@@ -59,7 +59,7 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
     from replay.scenario.load import load_model
 
     execution = Execution(**{name: options[name] for name in ("workers", "timeout", "memory", "dask")})
-    return {"model": load_model(options["model"]) if options["model"] else None, "execution": execution}
+    return {"model": None if options["model"] is None else load_model(options["model"]), "execution": execution}
 
 
 def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:

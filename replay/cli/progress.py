@@ -89,4 +89,5 @@ class RunProgress:
             return ""
         seconds = max(time.monotonic() - self._begin, 1e-9)
         rest = max(sum(self._costs.values()) - self._cost_done, 0.0) / max(self._cost_done, 1e-9) * seconds
-        return f", {60.0 * self._done / seconds:.0f} a minute, about {rest / 60.0:.0f} min left"
+        left = f"about {rest / 60.0:.0f} min left" if rest >= 60.0 else "less than a minute left"
+        return f", {60.0 * self._done / seconds:.0f} a minute, {left}"

@@ -10,19 +10,19 @@ import click
 
 from replay.cli import options
 from replay.cli.exit_codes import ExitCode
+from replay.cli.values import PathName
 
-FILE = click.Path(path_type=Path)
 MISSING = click.Choice(["fail", "create", "skip"])
 
 
 @click.command()
 @options.scenarios_argument
-@click.option("--baseline", type=FILE, required=True, help="Folder of accepted recordings; see `replay accept`.")
+@click.option("--baseline", type=PathName(), required=True, help="Folder of accepted recordings; see `replay accept`.")
 @options.output_option("regress")
-@click.option("--rules", type=FILE, help="Tolerances; rules.yaml beside SCENARIOS when left out.")
+@click.option("--rules", type=PathName(), help="Tolerances; rules.yaml beside SCENARIOS when left out.")
 @click.option("--missing-baseline", "missing", type=MISSING, default="fail", help="What a scenario without one is.")
 @click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
-@click.option("--history", type=FILE, help="File that each night appends to; OUTPUT/history.jsonl when left out.")
+@click.option("--history", type=PathName(), help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @options.model_option
 @options.select_option
 @options.shard_option
@@ -53,7 +53,7 @@ def regress(
         return options.nothing(patterns)
     rules = rules or rules_beside(scenarios)
     settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
-    settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or ""}
+    settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or "", "history": history}
     with RunProgress() as watch:
         found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
     return report(found, history=history)

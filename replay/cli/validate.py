@@ -28,6 +28,7 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
         return nothing(patterns)
     lines, data = [], []
     problems: list[Problem] = []
+    told: dict[str, None] = {}
     for scenario in chosen:
         remarks = notes(scenario)
         shown = [str(remark) for remark in remarks]
@@ -46,8 +47,9 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
             f"{scenario.name}: valid" + "".join(f", {n} {what.replace('_', ' ')}" for what, n in counts.items())
         )
         data.append({"scenario": scenario.name, **counts, "tags": list(scenario.tags), "notes": kept})
-        for remark in shown:
-            note(f"note: {remark}")
+        told |= dict.fromkeys(shown)  # the cases of a sweep share their text
+    for remark in told:
+        note(f"note: {remark}")
     if problems:
         raise ScenarioError(problems)
     say(form, lambda: "\n".join(lines), lambda: data)

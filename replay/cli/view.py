@@ -8,11 +8,12 @@ from pathlib import Path
 import click
 
 from replay.cli.exit_codes import ExitCode
+from replay.cli.values import PathName
 
 
 @click.command()
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--screenshot", type=click.Path(path_type=Path), metavar="PNG", help="Write a picture; needs no display.")
+@click.argument("recordings", nargs=-1, required=True, type=PathName())
+@click.option("--screenshot", type=PathName(), metavar="PNG", help="Write a picture; needs no display.")
 @click.option("--at", type=float, metavar="SECONDS", help="Moment of the picture; the end when left out.")
 @click.option("--web", is_flag=True, help="Serve the viewer to this machine's browsers, on 127.0.0.1 only.")
 def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None, web: bool) -> ExitCode:
@@ -25,6 +26,8 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
         raise click.UsageError("--at belongs to --screenshot")
     if at is not None and not 0.0 <= at < math.inf:
         raise click.UsageError(f"--at {at:g} is no moment of a recording; give seconds from its start")
+    if screenshot is not None and screenshot.suffix.lower() != ".png":
+        raise click.UsageError(f"--screenshot {screenshot} must end in .png, the only form of pictures")
     if screenshot is not None and web:
         raise click.UsageError("--screenshot and --web exclude each other")
     with one_recording(rerun_files(recordings)) as file:

@@ -19,6 +19,9 @@ from replay.logs.mcap_reader import McapLog
 
 DEFAULT_TOPIC = "/joint_states"
 
+MAX_TIME = 1 << 62
+"""Largest time [ns], before or after 0: 146 years, so that the difference of two fits in 64 bits."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointTrack:
@@ -47,7 +50,8 @@ def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str
         topic: where the joint states are.
 
     Raises:
-        RecordingError: the file is not a whole MCAP file, has no such topic, or the topic is of another kind.
+        RecordingError: the file is not a whole MCAP file, has no such topic, or the topic is of another kind; or a
+            time is beyond 146 years.
     """
     found: dict[str, dict[int, _Samples]] = {}
     stamped: set[int] = set()  # a simulated clock begins at zero: one such stamp is no missing one
@@ -74,9 +78,16 @@ def read_mcap(name: str, data: bytes, *, topic: str = DEFAULT_TOPIC) -> dict[str
     if not found:
         raise RecordingError(name, f"has no message with positions of joints on topic {topic!r}")
     return {
-        joint: _joined(samples.track(channel in stamped) for channel, samples in channels.items())
+        joint: _joined(samples.track(name, channel in stamped) for channel, samples in channels.items())
         for joint, channels in sorted(found.items())
     }
+
+
+def _times(name: str, times: list[int]) -> NDArray[np.int64]:
+    for time in times:
+        if not -MAX_TIME <= time <= MAX_TIME:
+            raise RecordingError(name, f"has a sample at {time / 1e9:.6g} s; times are read up to 146 years from 0")
+    return np.array(times, dtype=np.int64)
 
 
 class _Samples:
@@ -93,10 +104,9 @@ class _Samples:
         self._times.append(time)
         self._positions.append(position)
 
-    def track(self, stamped: bool) -> JointTrack:
-        """Return the samples at their stamps, or at their log times."""
-        time = np.array(self._stamps if stamped else self._times, dtype=np.int64)
-        return JointTrack(time, np.array(self._positions))
+    def track(self, name: str, stamped: bool) -> JointTrack:
+        """Return the samples of log `name` at their stamps, or at their log times."""
+        return JointTrack(_times(name, self._stamps if stamped else self._times), np.array(self._positions))
 
 
 def _joined(tracks: Iterable[JointTrack]) -> JointTrack:
@@ -121,11 +131,14 @@ def read_csv(
         needed: headings of columns that must hold numbers; any other one that holds something else is passed over.
 
     Raises:
-        RecordingError: there is no such column, or a line has another number of cells, or a cell is no finite number.
+        RecordingError: the file is empty or not UTF-8, there is no such column, a line has another number of cells, or
+            a cell is no finite number, or a time beyond 146 years.
     """
     try:
         rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
         headings = [heading.strip() for heading in next(rows, [])]
+        if not headings:
+            raise RecordingError(name, "has no headings in its first line, such as time,joint")
         if time_column not in headings:
             raise RecordingError(name, f"has no column {time_column!r}; its columns are {headings}")
         if len(set(headings)) != len(headings):
@@ -135,7 +148,7 @@ def read_csv(
             if len(cells) != len(headings):
                 raise RecordingError(name, f"line {line} has {len(cells)} cells, its headings are {len(headings)}")
             values = {heading: cell.strip() for heading, cell in zip(headings, cells, strict=True)}
-            time = round(_number(name, line, time_column, values[time_column]) * nanoseconds)
+            time = _nanoseconds(name, line, time_column, values[time_column], nanoseconds)
             for heading, (times, positions) in list(tracks.items()):
                 if not values[heading]:
                     continue
@@ -146,7 +159,12 @@ def read_csv(
                     if heading in needed:
                         raise
                     del tracks[heading]
-    except (UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise RecordingError(
+            name, f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save it as UTF-8"
+        ) from None
+    except csv.Error as error:
         raise RecordingError(name, f"cannot be read as CSV: {error}") from None
     return {
         heading: JointTrack(np.array(times, dtype=np.int64), np.array(positions))
@@ -161,9 +179,16 @@ def _lines(rows: Any) -> Iterator[tuple[int, list[str]]]:
             yield rows.line_num, cells
 
 
+def _nanoseconds(name: str, line: int, heading: str, cell: str, unit: float) -> int:
+    exact = _number(name, line, heading, cell) * unit
+    if not abs(exact) <= MAX_TIME:
+        raise RecordingError(name, f"line {line}, column {heading!r}: {cell} is beyond 146 years")
+    return round(exact)
+
+
 def _number(name: str, line: int, heading: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = math.nan if "_" in cell else float(cell)  # 1_000 is a number to Python only
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

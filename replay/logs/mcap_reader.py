@@ -8,6 +8,7 @@ is unpacked, so that damage anywhere is an error and never a different number.
 from __future__ import annotations
 
 import io
+import stat
 import struct
 import zlib
 from collections.abc import Collection, Iterator
@@ -74,7 +75,7 @@ class McapLog:
         self._salvage = salvage
         self._hint = "" if salvage or data is not None else "; `replay info` and `replay export` salvage what is whole"
         try:
-            self._size = self.path.stat().st_size if data is None else len(data)
+            self._size = _size_of(self.path) if data is None else len(data)
             self._stream: BinaryIO = self.path.open("rb") if data is None else io.BytesIO(data)
         except OSError as error:
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
@@ -295,3 +296,11 @@ class McapLog:
 
     def _damage(self, reason: str) -> RecordingError:
         return RecordingError(self._file, f"damaged: {reason}")
+
+
+def _size_of(path: Path) -> int:
+    """Return the size of a file [bytes]; RecordingError for a pipe, which would be waited for, or a device."""
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+        raise RecordingError(str(path), "is a pipe or a device; recordings are read from files")
+    return found.st_size

@@ -38,6 +38,8 @@ class PartFile:
             raise RecordingExistsError(str(path))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            if not self.part.is_char_device():  # a link to a file, or a pipe, is not what a killed run left
+                self.part.unlink(missing_ok=True)
             self._stream: BinaryIO = self.part.open("wb")
         except (OSError, UnicodeEncodeError) as error:
             raise write_error(path, error) from None

@@ -111,8 +111,9 @@ def leaf_kernel(function: Function) -> Function:
 
     numba counts references to every array that a compiled function is passed or slices, with atomic operations, even
     where nothing is kept: 5 ns each, 45 of the 50 ns of a support query of a box. A function that allocates nothing
-    needs no counting, since its caller holds the arrays; one that would allocate fails to compile. The results are the
-    same. numba has no public option for this: should its internal one disappear, the function is compiled as usual.
+    needs no counting, since its caller holds the arrays; one that would allocate fails to compile. Nor may it return an
+    array: the caller would give back a reference that nobody took. The results are the same. numba has no public option
+    for this: should its internal one disappear, the function is compiled as usual.
     """
     dispatcher = kernel(function)
     options = getattr(dispatcher, "targetoptions", None)  # None when NUMBA_DISABLE_JIT leaves the function as it is

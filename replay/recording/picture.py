@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -23,6 +25,7 @@ _ENDING = 10.0  # [s] until a viewer that is asked to end is killed
 _LOADING = 120.0  # [s] until the picture must have come to rest
 _TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
+_TYPED = 10_000_000  # [ns] by which a moment may be after the end: the end typed with few digits
 
 
 def viewer_binary() -> Path:
@@ -54,7 +57,8 @@ def picture(
 
     Raises:
         ViewerError: the viewer is not installed, cannot render here (it needs a Vulkan driver, such as Debian's
-            mesa-vulkan-drivers), cannot read the recording, or does not come to rest in time.
+            mesa-vulkan-drivers), lacks a letter, cannot read the recording, or does not come to rest in time; or
+            the recording ends before the moment.
         WriteError: the picture cannot be written.
     """
     recording, png = Path(recording), Path(png)
@@ -67,8 +71,11 @@ def picture(
         lines = {line.name: line for line in shown.timelines}
         if TIMELINE not in lines or lines[TIMELINE].end is None:
             raise ViewerError(f"{recording}: has no timeline {TIMELINE!r}; is it a recording of replay?")
-        moment = int(lines[TIMELINE].end) if at is None else round(at * 1e9)
-        viewer.set_time(TIMELINE, duration=_nanoseconds(moment), play_state="paused")
+        end = int(lines[TIMELINE].end)
+        moment = end if at is None else round(at * 1e9)
+        if moment > end + _TYPED:
+            raise ViewerError(f"{recording}: has no moment {at:g} s; it ends at {end / 1e9:g} s")
+        viewer.set_time(TIMELINE, duration=_nanoseconds(min(moment, end)), play_state="paused")
         time.sleep(max(0.0, _TOASTS - (time.monotonic() - began)))
         before, now = b"", None
         deadline = time.monotonic() + _LOADING
@@ -92,12 +99,14 @@ def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [str(viewer_binary()), str(recording), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
     command += ["--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen"]
     with tempfile.TemporaryFile("w+") as log, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home:
         places = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "APPDATA", "LOCALAPPDATA")
         environment = {**os.environ, **dict.fromkeys(places, home)}
-        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
+        process = subprocess.Popen(
+            [*command, _plain_name(recording, Path(home))], stdout=log, stderr=subprocess.STDOUT, env=environment
+        )
         try:
             yield _connect(ViewerClient, f"rerun+http://127.0.0.1:{port}/proxy", process, log)
         finally:
@@ -114,16 +123,22 @@ def end(viewer: subprocess.Popen[bytes]) -> None:
         viewer.wait()
 
 
+def _plain_name(recording: Path, folder: Path) -> str:
+    """Return a path that leads to the recording: the viewer shows it, and stops at a letter that its font lacks."""
+    plain = folder / f"recording{recording.suffix}"
+    try:
+        plain.symlink_to(recording)
+    except OSError:  # Windows allows it to some only
+        shutil.copyfile(recording, plain)
+    return str(plain)
+
+
 def _connect(client_type: Any, url: str, process: subprocess.Popen[bytes], log: IO[str]) -> Any:
     deadline = time.monotonic() + _STARTUP
     while time.monotonic() < deadline:
         if process.poll() is not None:
             log.seek(0)
-            text = log.read()
-            cause = "it found no Vulkan driver; on Debian, apt-get install mesa-vulkan-drivers"
-            if "adapter" not in text.lower():
-                cause = (text.strip().splitlines() or ["no message"])[-1]
-            raise ViewerError(f"the rerun viewer stopped at once: {cause}")
+            raise ViewerError(f"the rerun viewer stopped at once: {_cause(log.read())}")
         try:
             client = client_type.connect(url)
             client.get_state()
@@ -131,6 +146,16 @@ def _connect(client_type: Any, url: str, process: subprocess.Popen[bytes], log: 
         except Exception:  # whatever the library raises while nobody listens yet
             time.sleep(_PAUSE)
     raise ViewerError(f"the rerun viewer did not answer in {_STARTUP:.0f} s")
+
+
+def _cause(log: str) -> str:
+    """Return why a viewer stopped, from what it said."""
+    if missing := re.search(r"No glyph for (\S+ \(U\+\w+\))", log):
+        return f"its font has no letter {missing[1]}, which is in a name or a text that it shows"
+    if "adapter" in log.lower() and "adapter backend" not in log.lower():  # the second says which one it found
+        return "it found no Vulkan driver; on Debian, apt-get install mesa-vulkan-drivers"
+    lines = [line for line in log.splitlines() if "panicked at" in line] or log.strip().splitlines()[-1:]
+    return lines[0] if lines else "no message"
 
 
 def _when(get: Any, ready: Any, seconds: float, reason: str) -> Any:

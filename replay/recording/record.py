@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from replay.errors import RecordingExistsError
+from replay.logs.part_file import write_error
 from replay.recording.behind import WriteBehind, Writer
 from replay.recording.provenance import describe
 from replay.recording.scene_view import view
@@ -48,11 +50,12 @@ def record(
         model: replaces the scenario's own model; a built-in model's name, or a file that holds one, will do.
         savings: see `simulate`; the recording says when they were off.
         rrd: whether to make a rerun recording too.
-        overwrite: replace recordings that exist; they stay when the run fails.
+        overwrite: replace recordings that exist; they stay when the run fails. Without `rrd`, an old rerun recording is
+            removed: it shows another run.
         progress: called after each block.
 
     Raises:
-        RecordingExistsError: a recording exists and may not be overwritten.
+        RecordingExistsError: a recording exists, of either kind, and may not be overwritten.
         WriteError: a file cannot be written.
         ReplayError: whatever the simulation raises; no file is left then.
     """
@@ -82,10 +85,10 @@ def record_blocks(
         model=scene.model.identity(savings=scene.savings),
     )
     shown = view(scene)
-    paths = RecordedPaths(
-        mcap=Path(directory) / f"{scenario.name}.mcap",
-        rrd=Path(directory) / f"{scenario.name}.rrd" if rrd else None,
-    )
+    shown_in = Path(directory) / f"{scenario.name}.rrd"
+    if shown_in.exists() and not overwrite:
+        raise RecordingExistsError(str(shown_in))
+    paths = RecordedPaths(mcap=Path(directory) / f"{scenario.name}.mcap", rrd=shown_in if rrd else None)
     if rrd:  # before any file is made: loading rerun takes a second, in which a run may be interrupted
         from replay.recording.rerun_log import RerunWriter
     writers: list[Writer] = []  # the log of record is the last to be closed: where it is, all is
@@ -104,4 +107,9 @@ def record_blocks(
         for writer in writers:
             writer.discard()
         raise
+    if not rrd:
+        try:
+            shown_in.unlink(missing_ok=True)
+        except OSError as error:
+            raise write_error(shown_in, error) from None
     return paths

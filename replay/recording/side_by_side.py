@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,8 +34,15 @@ def side_names(files: Sequence[Path]) -> list[str]:
 
 @contextlib.contextmanager
 def one_recording(files: Sequence[Path]) -> Iterator[Path]:
-    """Give the file itself when it is one, else one that shows all of them and is gone afterwards."""
+    """Give the file itself when it is one, else one that shows all of them and is gone afterwards.
+
+    Raises:
+        ViewerError: a file cannot be read; the viewer would show nothing, or what is left of it.
+    """
     if len(files) == 1:
+        with _readable(files[0]) as reader:
+            for _ in reader.stream():
+                pass
         yield files[0]
         return
     with tempfile.TemporaryDirectory(prefix="replay-") as folder:
@@ -54,8 +62,6 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
         ViewerError: a file cannot be read.
         WriteError: the file cannot be written.
     """
-    from rerun.chunk import RrdReader
-
     sides = side_names(files)
     result = RerunFile(target, overwrite=True)
     try:
@@ -63,13 +69,10 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
         stream.send_recording_name(" | ".join(sides))
         found = _Found()
         for side, file in zip(sides, files, strict=True):
-            try:
-                reader = RrdReader(str(file))
+            with _readable(file) as reader:
                 found.look_from(reader)
                 for chunk in reader.stream():
                     _copy(stream, chunk, side, found)
-            except (RuntimeError, ValueError) as error:
-                raise ViewerError(f"{file}: cannot be read: {error}") from None
         stream.send_blueprint(
             blueprint.side_by_side(sides, sorted(found.charts), found.eye, found.target, found.end), make_active=False
         )
@@ -77,6 +80,22 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
     except BaseException:
         result.discard()
         raise
+
+
+@contextlib.contextmanager
+def _readable(file: Path) -> Iterator[Any]:
+    """Open a file to be read within; ViewerError when it is cut, damaged or no recording."""
+    from rerun.chunk import RrdReader
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a file that was cut has no footer, which the library only warns of
+            reader = RrdReader(str(file))
+        yield reader
+    except Warning:
+        raise ViewerError(f"{file}: cannot be read: it was cut, or is of an old format: it has no footer") from None
+    except (RuntimeError, ValueError) as error:
+        raise ViewerError(f"{file}: cannot be read: {str(error).splitlines()[0]}") from None
 
 
 class _Found:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import subprocess
+import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -40,9 +43,9 @@ def show(file: Path, *, web: bool = False) -> None:
     Raises:
         ViewerError: the viewer is not installed or fails, as it does without a display.
     """
-    command = [str(viewer_binary()), str(file)]
+    command = [str(viewer_binary()), str(file), "--bind", "127.0.0.1"]  # the window takes data from others too
     if web:
-        command += ["--web-viewer", "--bind", "127.0.0.1"]
+        command += ["--web-viewer", "--web-viewer-port", str(free_port(9090)), "--port", str(free_port(9876))]
     begun: list[subprocess.Popen[bytes]] = []
     try:
         with ThreadPoolExecutor(1) as starter:  # no signal interrupts a thread: a viewer that has begun is known here
@@ -53,4 +56,16 @@ def show(file: Path, *, web: bool = False) -> None:
         for process in begun:
             end(process)
     if code != 0:
-        raise ViewerError(f"the rerun viewer failed with code {code}; without a display use --web or --screenshot")
+        hint = "" if web else "; without a display use --web or --screenshot"
+        raise ViewerError(f"the rerun viewer failed with code {code}{hint}")
+
+
+def free_port(usual: int) -> int:
+    """Return a port of 127.0.0.1 that nobody listens on: the usual one, unless another viewer has it."""
+    for port in (usual, 0):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            if sys.platform != "win32":  # a port whose viewer has just ended is free; Windows means another thing by it
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return int(probe.getsockname()[1])
+    raise ViewerError("no port of 127.0.0.1 is free for the viewer")

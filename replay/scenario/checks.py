@@ -34,7 +34,8 @@ def check(names: Names) -> Iterator[Finding]:
 
 
 def _links(names: Names) -> Iterator[Finding]:
-    if not names.parents:
+    written = names.root.child("links")
+    if not names.parents and (written is None or isinstance(written.value, dict)):
         yield ("links",), "must hold at least one link"
     for link, parent in names.parents.items():
         if link == WORLD:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from replay.errors import Problem
+from replay.scenario.model import Scenario
 from replay.scenario.node import Node
 from replay.scenario.source import Library, SourceRule, dotted, problem_at, resolve_name
 from replay.scenario.yaml_text import parse
@@ -31,6 +32,7 @@ class Text:
     Attributes:
         sources: bytes by name of every file read.
         names: source name by the name that places carry.
+        whole: whether nothing was left out; else names may be missing that were meant to be there.
     """
 
     def __init__(self, library: Library, problems: list[Problem]) -> None:
@@ -38,6 +40,7 @@ class Text:
         self.problems = problems
         self.sources: dict[str, bytes] = {}
         self.names: dict[str, str] = {}
+        self.whole = True
 
     def read(self) -> Node | None:
         """Return the merged tree of the main file, or None when that file cannot be read at all."""
@@ -53,14 +56,17 @@ class Text:
         shown = self.library.shown(name)
         self.names[shown] = name
         root = parse(data, shown, self.problems)
+        self.whole &= root is not None and root.whole
         if root is None:
             return None
         if not isinstance(root.value, dict):
             what = "a scenario" if not above else "an included file"
             self.problems.append(root.place.problem(f"{what} is a mapping (key: value), not {root.shown()}"))
+            self.whole = False
             return None
         if above:
             for key in [key for key in root.mapping if key not in FRAGMENT_KEYS]:
+                self.whole &= key in Scenario.model_fields
                 rule = f"{key} does not belong in an included file; it may hold {', '.join(FRAGMENT_KEYS)}"
                 self.problems.append(root.keys[key].problem(rule))
                 del root.mapping[key]
@@ -88,6 +94,7 @@ class Text:
             data = self.library.read(name)
         except SourceRule as error:
             self.problems.append(problem_at(root, ("include", index), str(error)))
+            self.whole = False
             return None
         part = self._tree(name, data, above)
         if part is not None:
@@ -114,3 +121,4 @@ class Text:
             else:
                 rule = f"{dotted(here)} is defined twice; the first is at {into.keys[key]}"
                 self.problems.append(part.keys[key].problem(rule))
+                self.whole = False

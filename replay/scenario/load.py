@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from replay.errors import Problem, ScenarioError
+from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
 from replay.scenario.checks import check
 from replay.scenario.include import Text
@@ -17,6 +18,7 @@ from replay.scenario.names import Names
 from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
+from replay.scenario.sensors import Sensors
 from replay.scenario.source import (
     Attached,
     Folder,
@@ -80,22 +82,30 @@ def load_model(file_or_name: str | Path) -> Model:
     """Return a built-in model by its name, or the model that a YAML file holds.
 
     Raises:
+        InvalidValue: the name is empty.
         ScenarioError: there is neither a model nor a file of that name, or the file is not a valid model.
     """
     if str(file_or_name) in BUILTIN_MODELS:
         return BUILTIN_MODELS[str(file_or_name)]
+    names = ", ".join(sorted(BUILTIN_MODELS))
+    if not str(file_or_name):
+        raise InvalidValue("model", "''", f"names none; give a file, or a built-in model: {names}")
     library = Folder(Path(file_or_name))
     shown = library.shown(library.main)
     problems: list[Problem] = []
     try:
         root = parse(library.read(library.main), shown, problems)
     except SourceRule as error:
-        names = ", ".join(sorted(BUILTIN_MODELS))
         raise ScenarioError([Problem(f"{error}; built-in models are: {names}", file=shown)]) from None
     if root is None or problems:
         raise ScenarioError(problems)
-    if not isinstance(root.value, dict):
-        raise ScenarioError([root.place.problem("a model is a mapping with collision, distance and capacitive")])
+    if not isinstance(root.value, dict) or "links" in root.mapping:
+        what = "a scenario" if root.mapping else root.shown()
+        raise ScenarioError(
+            [root.place.problem(f"a model is a mapping of collision, distance, capacitive, not {what}")]
+        )
+    if set(root.mapping) == {"model"}:
+        raise ScenarioError([root.keys["model"].problem("model: a file of a model begins one level below this key")])
     try:
         return Model.model_validate(builtin_model(root.data()))
     except ValidationError as error:
@@ -160,11 +170,14 @@ class _File:
 
     def _validated(self, root: Node, problems: list[Problem]) -> Scenario:
         scenario: Scenario | None = None
+        named = self._text.whole and _sections_known(root)
         try:
             scenario = Scenario.model_validate(root.data())
         except ValidationError as error:
-            problems.extend(translate(error, root, Scenario))
-        problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
+            problems.extend(_not_told(problems, translate(error, root, Scenario)))
+            named = named and not any("[key]" in detail["loc"] for detail in error.errors(include_url=False))
+        if named:  # else names would be missed that are written, but not to be read
+            problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
         provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:
@@ -216,6 +229,21 @@ def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> l
     found, problems = tracks(scenario, library.shown(name), provenance.sources[name])
     provenance.tracks.update(found)
     return problems
+
+
+def _sections_known(root: Node) -> bool:
+    """Return whether no section that gives names is misspelt, which is told already."""
+    sensors = root.child("sensors")
+    unknown = root.mapping.keys() - Scenario.model_fields.keys()
+    return not any(get_close_matches(key, ("include", "links", "sensors"), cutoff=0.6) for key in unknown) and (
+        sensors is None or sensors.mapping.keys() <= Sensors.model_fields.keys()
+    )
+
+
+def _not_told(told: list[Problem], found: list[Problem]) -> list[Problem]:
+    """Return what was found at other places than what is told already: a value that cannot be read is told once."""
+    places = {(problem.file, problem.line, problem.column) for problem in told}
+    return [problem for problem in found if (problem.file, problem.line, problem.column) not in places]
 
 
 def _in_order(problems: list[Problem]) -> list[Problem]:

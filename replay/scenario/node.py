@@ -36,6 +36,7 @@ class Node:
         keys: places of the keys, for a mapping.
         text: the scalar as written, for messages.
         size: number of nodes in this tree with aliases written out.
+        whole: false for the root of a document with entries that had to be left out.
     """
 
     place: Place
@@ -43,6 +44,7 @@ class Node:
     keys: dict[str, Place] = field(default_factory=dict)
     text: str = ""
     size: int = 1
+    whole: bool = True
 
     @property
     def mapping(self) -> dict[str, Node]:
@@ -73,6 +75,6 @@ class Node:
         if isinstance(self.value, dict):
             return "a mapping"
         if isinstance(self.value, list):
-            return f"a list of {len(self.value)}"
+            return f"a list of {len(self.value)}" if self.value else "an empty list"
         text = repr(self.value) if isinstance(self.value, str) else self.text or "null"
         return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"

@@ -70,10 +70,13 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
         place = above.keys.get(str(path[-1]), root.place) if above is not None else root.place
         return place.problem(f"{dotted(path)}: unknown key; {did_you_mean(str(path[-1]), known)}")
     if kind in ("rule", "quantity"):
-        return problem_at(root, (*path, *context.get("at", ())), context["rule"])
+        return problem_at(root, (*path, *context.get("at", ())), context["rule"], kind=kind == "quantity")
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _tag(kind, context, path, root)
-    return problem_at(root, path, _rule(kind, context, detail["msg"], find(root, path)))
+        return _tag(kind, context, found, root)
+    rule = _rule(kind, context, detail["msg"], find(root, path))
+    if kind == "tuple_type" and found.entries:
+        rule += f" of {found.entries}"
+    return problem_at(root, path, rule, kind=kind.endswith("_type") or kind == "literal_error")
 
 
 def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -> str:
@@ -134,23 +137,35 @@ def _missing(found: _Location, last: str | int, root: Node) -> Problem:
     return locate(root, path).problem(f"{dotted((*path, last))} is missing{hint}")
 
 
-def _tag(kind: str, context: dict[str, Any], path: Path, root: Node) -> Problem:
+def _tag(kind: str, context: dict[str, Any], found: _Location, root: Node) -> Problem:
+    path = found.path
     if kind == "union_tag_invalid":
         known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
         return problem_at(root, (*path, "type"), f"is unknown; {did_you_mean(str(context['tag']), known)}")
     if context["discriminator"] == "'type'":
-        return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing")
+        node = find(root, path)
+        if node is not None and not isinstance(node.value, dict):
+            return problem_at(root, path, "must be a mapping (key: value)", kind=True)
+        return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing; known are {', '.join(found.tags)}")
     return problem_at(root, path, "needs one of the keys pair, distance, capacitive")
 
 
 @dataclass(frozen=True)
 class _Location:
-    """Where an error is; `owner` is the model, `length` the length of the list, that the last step belongs to."""
+    """Where an error is.
+
+    Attributes:
+        owner, length: the model, and the length of the list, that the last step belongs to.
+        tags: the types that the value may have, where it is one of several.
+        entries: how many entries the value has, where it is a list of so many.
+    """
 
     path: Path
     owner: type[BaseModel] | None = None
     length: int | None = None
     on_key: bool = False
+    tags: tuple[str, ...] = ()
+    entries: int | None = None
 
 
 def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Location:
@@ -169,14 +184,23 @@ def _follow(loc: Sequence[str | int], root: Node, model: type[BaseModel]) -> _Lo
         if step == "[key]":
             return _Location(tuple(path), on_key=True)
         owner = annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
-        length = len(get_args(annotation)) if get_origin(annotation) is tuple else None
+        length = _entries(annotation)
         annotation = _below(annotation, step)
         below = None if node is None else node.child(step)
         if below is None:
             break
         node = below
         path.append(step)
-    return _Location(tuple(path), owner, length)
+    plain = _plain(annotation)
+    tags = (_tags(member) for member in get_args(plain)) if get_origin(plain) in (Union, types.UnionType) else ()
+    known = tuple(tag for several in tags for tag in several)
+    return _Location(tuple(path), owner, length, tags=known, entries=_entries(plain))
+
+
+def _entries(annotation: Any) -> int | None:
+    """Return how many entries a list of fixed length has; None for other values."""
+    fixed = get_origin(annotation) is tuple and Ellipsis not in get_args(annotation)
+    return len(get_args(annotation)) if fixed else None
 
 
 def _plain(annotation: Any) -> Any:
@@ -197,15 +221,16 @@ def _choose(annotation: Any, step: str | int) -> Any:
     """Return the member of a union that a tag stands for, or None when this is no union."""
     if get_origin(annotation) not in (Union, types.UnionType):
         return None
-    for member in get_args(annotation):
-        tags = [getattr(item, "tag", None) for item in get_args(member)[1:]] if get_origin(member) is Annotated else []
-        plain = _plain(member)
-        fields = getattr(plain, "model_fields", {})
-        if "type" in fields and get_origin(fields["type"].annotation) is Literal:
-            tags.extend(get_args(fields["type"].annotation))
-        if step in tags:
-            return member
-    return None
+    return next((member for member in get_args(annotation) if step in _tags(member)), None)
+
+
+def _tags(member: Any) -> list[Any]:
+    """Return what selects a member of a union: its tag, or its literal `type`."""
+    tags = [getattr(item, "tag", None) for item in get_args(member)[1:]] if get_origin(member) is Annotated else []
+    fields = getattr(_plain(member), "model_fields", {})
+    if "type" in fields and get_origin(fields["type"].annotation) is Literal:
+        tags.extend(get_args(fields["type"].annotation))
+    return tags
 
 
 def _below(annotation: Any, step: str | int) -> Any:

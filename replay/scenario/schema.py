@@ -6,25 +6,31 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from replay.scenario.methods import BUILTIN_MODELS
+from replay.scenario.fields import Part
+from replay.scenario.methods import BUILTIN_MODELS, Model
 from replay.scenario.model import Fragment, Scenario
 from replay.scenario.units import QUANTITY_KEY
 
-FILES: Final[dict[str, type[Fragment]]] = {"scenario.schema.json": Scenario, "fragment.schema.json": Fragment}
+FILES: Final[dict[str, type[Part]]] = {
+    "scenario.schema.json": Scenario,
+    "fragment.schema.json": Fragment,
+    "model.schema.json": Model,
+}
 
 
-def schema_text(model: type[Fragment]) -> str:
-    """Return the JSON Schema (draft 2020-12) of a scenario or of an included fragment, as text."""
+def schema_text(model: type[Part]) -> str:
+    """Return the JSON Schema (draft 2020-12) of a scenario, of an included fragment or of a model, as text."""
     schema = model.model_json_schema(mode="validation")
     definitions: dict[str, Any] = schema.pop("$defs")
     quantities: dict[str, Any] = {}
     definitions = {name: _hoisted(body, quantities) for name, body in definitions.items()}
     body = _hoisted(schema, quantities)
-    name = body["properties"]["model"]
-    body["properties"]["model"] = {
-        "description": name.pop("description"),
-        "anyOf": [{"$ref": name.pop("$ref")}, {"type": "string", "enum": sorted(BUILTIN_MODELS)}],
-    }
+    if "model" in body["properties"]:
+        name = body["properties"]["model"]
+        body["properties"]["model"] = {
+            "description": name.pop("description"),
+            "anyOf": [{"$ref": name.pop("$ref")}, {"type": "string", "enum": sorted(BUILTIN_MODELS)}],
+        }
     result = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **body,

@@ -99,11 +99,14 @@ def find(root: Node, path: tuple[str | int, ...]) -> Node | None:
     return node
 
 
-def problem_at(root: Node, path: tuple[str | int, ...], rule: str) -> Problem:
-    """Return `path = value rule` with its place."""
+def problem_at(root: Node, path: tuple[str | int, ...], rule: str, *, kind: bool = False) -> Problem:
+    """Return `path = value rule` with its place; of a collection its kind, where that is what is wrong."""
     node = find(root, path)
-    scalar = node is not None and not isinstance(node.value, dict | list)
-    value = f" = {node.shown()}" if node is not None and scalar else ""
+    value = ""
+    if node is not None and not isinstance(node.value, dict | list):
+        value = f" = {node.shown()}"
+    elif node is not None and kind:
+        value = f" ({node.shown()})"
     name = dotted(path)
     return locate(root, path).problem(f"{name}{value} {rule}" if name else rule)
 
@@ -217,6 +220,8 @@ def _read(path: Path) -> bytes:
             raise SourceRule(f"has {size} bytes; at most {MAX_FILE_BYTES} are read")
         return path.read_bytes()
     except FileNotFoundError:
+        if path.is_symlink():
+            raise SourceRule("is a link to a file that does not exist") from None
         raise SourceRule(f"does not exist{_similar(path)}") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)

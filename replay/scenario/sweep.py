@@ -13,7 +13,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from replay.errors import Problem
 from replay.scenario.fields import Part, rejected
-from replay.scenario.node import Node
+from replay.scenario.node import Node, Place
 from replay.scenario.source import dotted
 
 MAX_CASES: Final = 10_000
@@ -101,10 +101,17 @@ def replaced(root: Node, case: SweepCase, problems: list[Problem]) -> Node:
     for written, value in case.values.items():
         found = _resolve(tree, written)
         if isinstance(found, str):
-            problems.append(value.place.problem(f"sweep path {written!r} {found}"))
+            problems.append(_written_at(root, written, value).problem(f"sweep path {written!r} {found}"))
         else:
             tree = _with(tree, found, value)
     return tree
+
+
+def _written_at(root: Node, path: str, value: Node) -> Place:
+    """Return where a path of a sweep is written: a grid's once for all its values, a list's in each of its cases."""
+    sweep = root.child("sweep")
+    grid = None if sweep is None else sweep.child("grid")
+    return value.place if grid is None else grid.keys.get(path, value.place)
 
 
 def _combinations(sweep: Node) -> Iterator[dict[str, Node]]:

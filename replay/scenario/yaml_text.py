@@ -88,7 +88,7 @@ def _events(text: str, file: str, problems: list[Problem]) -> Iterator[Any]:
         raise _Rejected from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        message = " ".join(str(error.problem or error.context).split())
+        message = re.sub(r"\('(.*)',\)", r"'\1'", " ".join(str(error.problem or error.context).split()))
         if "\\t" in message:
             message = "a tab cannot indent YAML; use spaces"
         elif error.context and error.context_mark is not None:
@@ -108,6 +108,7 @@ class _Builder:
         self.problems = problems
         self.anchors: dict[str, Node | None] = {}
         self.nodes = 0
+        self.whole = True
 
     def build(self, text: str) -> Node | None:
         self.events = _events(text, self.file, self.problems)
@@ -129,6 +130,7 @@ class _Builder:
         if root is None or (root.value is None and not root.text):
             self.problems.append(Problem("the file is empty", file=self.file))
             return None
+        root.whole = self.whole
         return root
 
     def place(self, event: Any) -> Place:
@@ -184,10 +186,15 @@ class _Builder:
                 break
             key = self.node(event, depth + 1)
             value = self.node(next(self.events), depth + 1)
+            if value.value is None and not value.text:
+                value.place = self.place(event)  # nothing is written; the scanner's mark is on a line below
             node.size += key.size + value.size
             name = key.value
             if not isinstance(name, str):
-                self.report(event, f"key {key.shown()} is not text; keys are text, write it in quotes")
+                if isinstance(key.value, dict | list):
+                    self.report(event, f"{key.shown()} where a key belongs; keys are text")
+                else:
+                    self.report(event, f"key {key.shown()} is not text; keys are text, write it in quotes")
             elif name == "<<" and key.text == "<<":
                 self.report(
                     event, "merge keys (<<) are not YAML 1.2; write the keys out, or use an alias for the whole"
@@ -197,6 +204,8 @@ class _Builder:
             else:
                 node.mapping[name] = value
                 node.keys[name] = self.place(event)
+                continue
+            self.whole = False
         return node
 
     def sequence(self, start: Any, depth: int) -> Node:

@@ -84,6 +84,11 @@ def test_nothing_changes_when_one_of_them_cannot_be_stored(run, tmp_path):
     assert baseline.names() == ["a"]
     assert baseline.recording("a").read_bytes() == before
     assert len((tmp_path / "accepted.jsonl").read_text().splitlines()) == 1
+    with pytest.raises(RecordingError):  # the mesh of a, the first of them, was written by then
+        Baseline(tmp_path / "new").store(
+            {**entries(run, "a"), "b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW
+        )
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):

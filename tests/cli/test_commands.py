@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import rerun as rr
 
 import replay
 import replay.batch.run
@@ -66,7 +67,7 @@ def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys)
     before = (recorded / "swing.mcap").read_bytes()
     assert run(["run", str(scenario), "-o", str(recorded.parent)]) is ExitCode.INVALID
     assert "exists already; pass --overwrite" in capsys.readouterr().err
-    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite", "--no-rrd"]) is ExitCode.FINE
+    assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite"]) is ExitCode.FINE
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
 
@@ -115,6 +116,15 @@ def test_a_mistake_in_a_sweep_is_not_said_a_thousand_times(tmp_path, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 101
     assert lines[-1] == "replay: error: ... and 900 more"
+
+
+def test_a_note_that_the_cases_of_a_sweep_share_is_said_once(tmp_path, capsys):
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        SCENARIO.replace("EXPECTED", "never").replace("time: 1,", "time: 3,") + "sweep: {grid: {rate: [10, 20]}}\n"
+    )
+    assert run(["validate", str(path)]) is ExitCode.FINE
+    assert capsys.readouterr().err.count("after the scenario's end") == 1
 
 
 def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
@@ -225,7 +235,13 @@ def test_export_writes_tables_with_units(recorded, tmp_path, capsys):
         (["view", "none.rrd"], "no such file"),
         (["view", "none.txt"], "neither a .rrd nor a .mcap"),
         (["view", "none.rrd", "--at", "1"], "--at belongs to --screenshot"),
+        (["view", "none.rrd", "--screenshot", "x.jpg"], "x.jpg must end in .png"),
         (["run", "none.yaml"], "is not there"),
+        (["run", "/dev/null"], "is neither a file nor a folder"),
+        (["run", ""], "the path is empty"),
+        (["run", "x", "-o", ""], "the path is empty"),
+        (["run", "x", "--model", ""], "model = '': names none; give a file, or a built-in model: thesis2015"),
+        (["export", "x.mcap"], "Missing option '--format'. Choose from: csv, json, parquet; see replay export --help"),
         (["view", "none.rrd", "--screenshot", "x.png", "--at", "nan"], "is no moment of a recording"),
     ],
 )
@@ -234,6 +250,15 @@ def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     said = capsys.readouterr().err
     assert message in said
     assert said.startswith("replay: error: ") and said.count("\n") == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a system without /dev/full")
+def test_a_result_that_standard_output_has_no_space_for_is_one_line(scenario):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "replay", "validate", str(scenario)]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == ExitCode.INVALID
+    assert done.stderr == ("replay: error: the result cannot be written to standard output: No space left on device\n")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["validate", "SCENARIO"], ["--version"]])
@@ -301,9 +326,10 @@ def test_an_interrupted_run_leaves_no_half_recordings(tmp_path, number):
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 def test_the_viewer_does_not_outlive_the_command(tmp_path):
     viewer = tmp_path / "viewer"
-    viewer.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
+    viewer.write_text(f"#!/bin/sh\necho $@ > {tmp_path}/arguments\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
     viewer.chmod(0o700)
-    (tmp_path / "a.rrd").write_bytes(b"")
+    with rr.RecordingStream("replay") as stream:
+        stream.save(tmp_path / "a.rrd")
     code = (
         "import pathlib, replay.recording.viewer as v; from replay.cli.main import main;"
         f"v.viewer_binary = lambda: pathlib.Path({str(viewer)!r}); main(['view', {str(tmp_path / 'a.rrd')!r}])"
@@ -315,6 +341,7 @@ def test_the_viewer_does_not_outlive_the_command(tmp_path):
             time.sleep(0.05)
         process.terminate()
         assert process.wait(timeout=30.0) == ExitCode.INTERRUPTED
+    assert (tmp_path / "arguments").read_text().split() == [str(tmp_path / "a.rrd"), "--bind", "127.0.0.1"]
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)
 

@@ -224,9 +224,10 @@ def test_a_request_to_stop_after_the_results_changes_nothing(tmp_path):
 
 def test_a_baseline_folder_that_cannot_be_written_is_told_in_the_reports(tmp_path, capsys):
     scenes.write(tmp_path / "in", "a")
-    (tmp_path / "base").write_text("where the folder should be")
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base" / "a").write_text("where the folder should be")
     assert night(tmp_path, tmp_path / "out", "--missing-baseline", "create", "--rrd", "none") is ExitCode.FAILED
-    assert f"a: missing baseline: {tmp_path / 'base'}: cannot be written" in capsys.readouterr().out
+    assert f"a: missing baseline: {tmp_path / 'base'}" in capsys.readouterr().out
     assert junit_of(tmp_path / "out") == {"a": "failure"}
 
 
@@ -275,3 +276,17 @@ def test_a_sweep_is_run_case_by_case_and_a_case_again_from_its_recording(tmp_pat
     recording = out / name / f"{name}.mcap"
     assert run(["run", str(recording), "-o", str(tmp_path / "again"), "--no-rrd", "--select", name]) is ExitCode.FINE
     assert (tmp_path / "again" / name / f"{name}.mcap").read_bytes() == recording.read_bytes()
+
+
+def test_a_night_that_could_not_be_reported_is_not_begun(tmp_path, capsys):
+    scenes.write(tmp_path / "in", "plain")
+    (tmp_path / "file").write_text("")
+    for arguments, message in [
+        (["--baseline", str(tmp_path / "file")], "is a file; give the folder that `replay accept` writes"),
+        (["--baseline", str(tmp_path), "--history", str(tmp_path)], "cannot be read before it is appended to: Is a"),
+        (["--baseline", str(tmp_path), "--history", str(tmp_path / "file" / "h")], "file where a folder is needed"),
+    ]:
+        assert run(["regress", str(tmp_path / "in"), "-o", str(tmp_path / "out"), *arguments]) is ExitCode.INVALID
+        said = capsys.readouterr().err
+        assert message in said and said.count("\n") == 1
+        assert not (tmp_path / "out").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -117,10 +118,13 @@ def test_hostile_files_are_refused_in_one_line(tmp_path: Path, data: bytes, word
     assert "\n" not in str(caught.value)
 
 
-def test_an_absent_file_and_a_folder_are_refused(tmp_path: Path) -> None:
+def test_an_absent_file_a_folder_and_a_pipe_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "none.mcap", tmp_path):
         with pytest.raises(RecordingError, match="cannot be read"):
             McapLog(path)
+    os.mkfifo(tmp_path / "pipe")  # whoever opens it waits for a writer
+    with pytest.raises(RecordingError, match="is a pipe or a device"):
+        McapLog(tmp_path / "pipe")
 
 
 def test_messages_outside_chunks_keep_their_order(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ The system refuses to let a file of this process grow beyond a limit (RLIMIT_FSI
 from __future__ import annotations
 
 import contextlib
+import os
 import resource
 import signal
 from collections.abc import Callable, Iterator
@@ -109,6 +110,17 @@ def test_links_and_devices_are_written_in_place(tmp_path: Path) -> None:
     with pytest.raises(WriteError, match="No space left"):
         write_file(tmp_path / "full", "x")
     assert (tmp_path / "full").is_symlink()
+
+
+def test_an_unfinished_file_is_replaced_whatever_has_its_name(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    kept.write_text("precious")
+    (tmp_path / "a.part").symlink_to(kept)
+    os.mkfifo(tmp_path / "b.part")  # whoever opens it waits for a reader
+    for name in ("a", "b"):
+        assert write_file(tmp_path / name, "new").is_file() and not (tmp_path / name).is_symlink()
+        assert (tmp_path / name).read_text() == "new"
+    assert kept.read_text() == "precious"
 
 
 def test_a_file_where_a_folder_is_needed_is_named(tmp_path: Path) -> None:

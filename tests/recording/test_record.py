@@ -114,6 +114,17 @@ def test_an_error_keeps_the_recordings_of_before(scene: Scene, tmp_path: Path) -
     assert not list(tmp_path.glob("*.part"))
 
 
+def test_a_rerun_recording_of_another_run_is_not_left_beside_the_log(scene: Scene, tmp_path: Path) -> None:
+    paths = record_blocks(scene, blocks(scene), tmp_path)
+    assert paths.rrd is not None
+    paths.mcap.unlink()
+    with pytest.raises(RecordingExistsError, match=r"two_boxes\.rrd"):
+        record_blocks(scene, blocks(scene), tmp_path, rrd=False)
+    assert paths.rrd.is_file()
+    record_blocks(scene, blocks(scene), tmp_path, rrd=False, overwrite=True)
+    assert [path.name for path in tmp_path.glob("two_boxes*")] == [paths.mcap.name]
+
+
 def test_the_view_shows_every_shape_cone_and_plate(scene: Scene) -> None:
     shown = view(scene)
     assert [body.name for body in shown.bodies] == ["post/box", "rail/bar", "slider/box"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from rerun.chunk import RrdReader
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
 from replay.recording.blueprint import eye_of
-from replay.recording.picture import picture, viewer_binary
+from replay.recording.picture import _cause, picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
 from replay.recording.scene_view import BodyView, indexed
@@ -192,18 +193,39 @@ def test_cones_have_their_aperture_and_range() -> None:
 
 
 @pytest.mark.skipif(not list(Path("/usr/share/vulkan/icd.d").glob("*.json")), reason="needs a Vulkan driver")
-def test_the_viewer_shows_contact_in_red(path: Path, tmp_path: Path) -> None:
-    picture(path, tmp_path / "contact.png", at=2.5, size=(1000, 700))
+def test_the_viewer_shows_contact_in_red(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # what the viewer is given stands there
+    named = tmp_path / "検査 ∕ 😀.rrd"  # the viewer's font has none of these letters
+    named.write_bytes(path.read_bytes())
+    with pytest.raises(ViewerError, match="has no moment 99 s; it ends at "):
+        picture(named, tmp_path / "late.png", at=99.0)
+    picture(named, tmp_path / "contact.png", at=2.5, size=(1000, 700))
     with Image.open(tmp_path / "contact.png") as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
     scene = pixels[:, : pixels.shape[1] // 2]
     red = (scene[..., 0] > 120) & (scene[..., 1] < 70) & (scene[..., 2] < 70)
     assert red.mean() > 0.01
     running = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
-    assert str(path) not in running, "the viewer must not outlive the picture"
+    assert str(tmp_path) not in running, "the viewer must not outlive the picture"
 
 
 def test_pictures_of_nothing_are_refused(tmp_path: Path) -> None:
     assert viewer_binary().is_file()
     with pytest.raises(ViewerError, match="no such file"):
         picture(tmp_path / "none.rrd", tmp_path / "none.png")
+
+
+@pytest.mark.parametrize(
+    ("log", "cause"),
+    [
+        (
+            "wgpu adapter backend: Vulkan\nthread 'main' panicked at 'No glyph for \"検\" (U+691C) in Proportional.",
+            'its font has no letter "検" (U+691C), which is in a name or a text that it shows',
+        ),
+        ("Error: Failed to find a graphics adapter", "it found no Vulkan driver"),
+        ("INFO wgpu adapter backend: Vulkan\nthread 'main' panicked at 'x'\nstack backtrace:", "panicked at 'x'"),
+        ("", "no message"),
+    ],
+)
+def test_a_viewer_that_stops_says_why(log: str, cause: str) -> None:
+    assert cause in _cause(log)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from rerun.chunk import RrdReader
 from replay.errors import ViewerError
 from replay.recording.rerun_log import RerunWriter
 from replay.recording.side_by_side import one_recording, side_names
+from replay.recording.viewer import free_port
 from tests.recording import moving
 
 
@@ -67,3 +69,23 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
     (tmp_path / "b.rrd").write_text("nothing")
     with pytest.raises(ViewerError, match=r"b\.rrd: cannot be read"), one_recording([file, tmp_path / "b.rrd"]):
         pass
+    whole = file.read_bytes()
+    for name, data in {"cut": whole[: len(whole) // 2], "empty": b""}.items():
+        (tmp_path / f"{name}.rrd").write_bytes(data)
+        with (
+            pytest.raises(ViewerError, match=rf"{name}\.rrd: cannot be read"),
+            one_recording([tmp_path / f"{name}.rrd"]),
+        ):
+            pass
+    with one_recording([file]) as shown:
+        assert shown == file
+
+
+def test_a_second_viewer_for_browsers_finds_a_port() -> None:
+    with socket.socket() as first:
+        first.bind(("127.0.0.1", 0))
+        first.listen()
+        taken = first.getsockname()[1]
+        second = free_port(taken)
+        assert second not in (0, taken)
+    assert free_port(taken) == taken

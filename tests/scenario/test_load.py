@@ -162,8 +162,14 @@ def test_models_come_by_name_or_from_a_file(tmp_path):
         "1:20: distance.method = 'ray' must be 'exact', 'rays' or 'thesis'",
         "2:1: noise: unknown key; known are collision, distance, capacitive",
     ]
+    file.write_text("model:\n  distance: {method: rays}\n")
+    with pytest.raises(ScenarioError, match=":1:1: model: a file of a model begins one level below this key"):
+        load_model(file)
+    file.write_text("version: 1\nlinks: {a: {}}\n")
+    with pytest.raises(ScenarioError, match="a model is a mapping of collision, distance, capacitive, not a scenario"):
+        load_model(file)
     file.write_text("- 1\n")
-    with pytest.raises(ScenarioError, match="a model is a mapping"):
+    with pytest.raises(ScenarioError, match=r"a model is a mapping .* not a list of 1"):
         load_model(file)
     with pytest.raises(ScenarioError, match=r"does not exist.*built-in models are: thesis2015"):
         load_model(tmp_path / "thesis")

@@ -32,6 +32,13 @@ def test_the_files_are_up_to_date(name):
     assert written == schema_text(FILES[name]), "run `make schemas`"
 
 
+def test_a_models_file_is_what_the_command_line_reads():
+    schema = validator("model.schema.json")
+    assert schema.is_valid({"distance": {"method": "rays", "count": 61}, "capacitive": {"rtol": 1e-4}})
+    assert not schema.is_valid({"model": {"distance": {"method": "rays"}}})
+    assert not schema.is_valid({"collision": {"bounds": "box"}})
+
+
 @pytest.mark.parametrize("path", [DATA / "full.yaml", DATA / "parts" / "sensors.yaml", *SHIPPED], ids=lambda p: p.name)
 def test_scenarios_are_valid_and_name_their_schema(path):
     first = path.read_text(encoding="utf-8").split("\n", 1)[0]

@@ -100,6 +100,7 @@ def test_a_list_is_case_by_case_and_may_replace_whole_parts(tmp_path):
             "  grid: {sensors.distance.tip.apperture: [1]}\n",
             "sensors.distance.tip.apperture: unknown key; did you mean",
         ),
+        ("  grid: {links.c.pose: [1, 2]}\n", "eye.yaml:11:10: sweep path 'links.c.pose' names nothing"),
         ("  grid: {name: [a]}\n", "cannot be swept: name belongs to the file"),
         ("  grid: {'motion.moves[1].speed': [1]}\n", "motion.moves is a list of 1"),
         ("  grid: {rate.x: [1]}\n", "rate = '10 Hz' has no parts"),

@@ -83,8 +83,8 @@ def test_moments_are_those_of_the_triangles(body):
     steps = np.array([(s, t) for s, t in steps if s + t < 1.0])
     assert len(steps) == 64
     for node in (0, 1, int(tree.second[0]), len(tree.begin) - 1):
-        corners = clusters.parts[tree.begin[node] : tree.end[node], :9].reshape(-1, 3, 3)
-        areas = clusters.parts[tree.begin[node] : tree.end[node], SIZE]
+        corners = clusters.triangles[tree.begin[node] : tree.end[node], :9].reshape(-1, 3, 3)
+        areas = clusters.triangles[tree.begin[node] : tree.end[node], SIZE]
         a, b, c = corners[:, None, 0], corners[:, None, 1], corners[:, None, 2]
         points = a + steps[None, :, :1] * (b - a) + steps[None, :, 1:] * (c - a) - clusters.nodes[node, CENTROID:3]
         weights = np.repeat(areas[:, None] / 64.0, 64, axis=1) / areas.sum()

@@ -9,8 +9,8 @@ from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
 from replay.numerics.double_double import triangle_area
 from replay.sensing.capacitive import exact, plate_integral
+from replay.sensing.capacitive.area_share import share
 from replay.sensing.capacitive.clusters import make_clusters
-from replay.sensing.capacitive.pieces import share
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from tests.sensing import plate_reference
 

@@ -25,23 +25,28 @@ from replay.sensing.capacitive.clusters import (
     RADIUS,
     SIGMA,
 )
-from replay.sensing.capacitive.lanes import LANES, load, padded
+from replay.sensing.capacitive.lanes import (
+    DROP,
+    ERROR,
+    FOUND,
+    KEEP,
+    LANES,
+    LEAST,
+    OPEN,
+    REGION,
+    SHIFT,
+    VERDICT,
+    load,
+    padded,
+)
+from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, beyond_borders, region_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Singles = NDArray[np.float32]
-Triple = tuple[float, float, float]
-
-DROP, OPEN, KEEP = -1, 0, 1
-"""Verdicts on a node: nothing of it counts; it must be opened; it can be summed as a whole."""
 
 CLOSEST = 1.5
 """Nodes and triangles nearer than so many of their radii are not expanded."""
-
-FOUND, VERDICT = 40, 44
-ERROR, SHIFT, LEAST, REGION = range(4)
-"""What is found of a node or triangle, in the lanes from column FOUND on: the error bound, what the expansion is
-corrected by, a lower bound of the integral [m], and the region it is expanded in, see `region_of`."""
 
 _MORE, _LEAST_AREA = 1.0 + 2.0**-22, 1e-37
 """An area in half the digits, rounded down, is less than it is by no more than these factor and sum [m^2]."""
@@ -51,35 +56,11 @@ _FIFTH = (math.sqrt(7.875), math.sqrt(4.203125), 1.0)
 
 
 @inlined_kernel
-def place(T: Floats, x: float, y: float, z: float) -> Triple:
-    """Return a point of the body in the plate's frame."""
-    return (
-        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
-        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
-        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
-    )
-
-
-@inlined_kernel
 def _reaches(e: Triple, middle: Triple, half: Triple, radius: float) -> tuple[float, float]:
     """Return how far a node reaches from its centroid along a unit vector and against it: its box, or its sphere."""
     offset = e[0] * middle[0] + e[1] * middle[1] + e[2] * middle[2]
     extent = abs(e[0]) * half[0] + abs(e[1]) * half[1] + abs(e[2]) * half[2]
     return min(extent + offset, radius), min(extent - offset, radius)
-
-
-@inlined_kernel
-def region_of(x: float, y: float, half_x: float, half_y: float) -> float:
-    """Return the region of a point: 3 sx + sy, s = 1 or -1 beyond the border on that side, 0 between the borders."""
-    sx = 1.0 if x > half_x else (-1.0 if x < -half_x else 0.0)
-    return 3.0 * sx + (1.0 if y > half_y else (-1.0 if y < -half_y else 0.0))
-
-
-@inlined_kernel
-def sides_of(region: float) -> tuple[float, float]:
-    """Return sx and sy of a region."""
-    sx = 1.0 if region > 1.5 else (-1.0 if region < -1.5 else 0.0)
-    return sx, region - 3.0 * sx
 
 
 @inlined_kernel
@@ -115,22 +96,14 @@ def _over_borders(
 
 
 @leaf_kernel
-def judge_nodes(
-    outlines: Singles,
-    which: Ints,
-    count: int,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    both: bool,
-    blur: float,
-    lanes: Floats,
-) -> None:
+def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, lanes: Floats) -> None:
     """Write what is found of the nodes which[:count], and the verdict on each, to the lanes.
 
-    Places may be off by `blur` [m]; the distance that is computed with is a lower bound.
+    Places may be off by the plate's `blur`; the distance that is computed with is a lower bound.
     """
+    T, half_x, half_y, both, blur = plate.T_plate_body, plate.half_x, plate.half_y, plate.both, plate.blur
     load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
+    # taken out of the loop by hand: the compiler cannot know that lanes and pose are different memory
     ex, ey, ez = (T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2])
     tx, ty, tz = T[0, 3], T[1, 3], T[2, 3]
     for i in range(padded(count)):
@@ -146,7 +119,7 @@ def judge_nodes(
         y = ey[0] * a + ey[1] * b + ey[2] * c + ty
         z = ez[0] * a + ez[1] * b + ez[2] * c + tz
         above, below = _reaches(ez, middle, half, h)
-        beyond_x, beyond_y = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+        beyond_x, beyond_y = beyond_borders(x, y, half_x, half_y)
         r = math.sqrt(beyond_x * beyond_x + beyond_y * beyond_y + z * z) - blur
         verdict = 1.0 if r > CLOSEST * h else 0.0
         verdict = 0.0 if not both and z - below <= blur else verdict

@@ -31,13 +31,13 @@ SECOND_CHILD, BEGIN, END = range(3)
 """Columns of `Clusters.links`."""
 
 CORNERS, REACH, SPREAD, SIZE = 0, 9, 10, 11
-"""Columns of `Clusters.parts`; CORNERS is the first of nine."""
+"""Columns of `Clusters.triangles`; CORNERS is the first of nine."""
 
 SECOND, THIRD, FOURTH, WHOLE, PLACE, NUMBER = 0, 6, 16, 31, 32, 35
 """First columns of `Clusters.moments`, in the order of _KEPT: 6 of degree 2, 10 of degree 3, 15 of degree 4; the area,
 the centroid and the number of triangles."""
 
-OUTLINE_COLUMNS, PART_COLUMNS, MOMENT_COLUMNS = 16, 16, 40
+OUTLINE_COLUMNS, TRIANGLE_COLUMNS, MOMENT_COLUMNS = 16, 16, 40
 
 _LINE = 64
 """[bytes] what a processor reads of its memory at a time; rows begin on such a line."""
@@ -63,12 +63,11 @@ class Clusters(NamedTuple):
     the middle of its box, relative to the centroid, half the box's edges, and the largest standard deviation of its
     points in any direction [m]. The area is rounded down and all other sizes are rounded up; places are as near as can
     be, within `blur`.
-    A triangle's row in `parts` holds its corners [m], the largest distance of a corner from the centroid [m], the mean
-    of |d|^2 [m^2] and the area [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are
-    neighbours.
+    A triangle's row holds its corners [m], the largest distance of a corner from the centroid [m], the mean of |d|^2
+    [m^2] and the area [m^2]. Triangles are listed in the order of the tree, so that a node's triangles are neighbours.
     """
 
-    parts: Floats  # (n, 16)
+    triangles: Floats  # (n, 16)
     nodes: Floats  # (m, 16)
     outlines: Singles  # (m, 16)
     blur: float  # [m]
@@ -85,10 +84,10 @@ def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
     areas = triangle_areas(ordered)
     centroids = ordered.mean(axis=1)
     squares = np.sum((ordered - centroids[:, None]) ** 2, axis=2)
-    parts = _rows(len(ordered), PART_COLUMNS, np.float64)
-    parts[:, :REACH] = ordered.reshape(-1, 9)
-    parts[:, REACH], parts[:, SPREAD] = np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0
-    parts[:, SIZE] = areas
+    rows = _rows(len(ordered), TRIANGLE_COLUMNS, np.float64)
+    rows[:, :REACH] = ordered.reshape(-1, 9)
+    rows[:, REACH], rows[:, SPREAD] = np.sqrt(squares.max(axis=1)), squares.sum(axis=1) / 12.0
+    rows[:, SIZE] = areas
     count = len(tree.begin)
     nodes, moments = np.zeros((count, 16)), _rows(count, MOMENT_COLUMNS, np.float64)
     _gather(ordered, areas, centroids, tree.second, tree.begin, tree.end, nodes, moments)
@@ -100,7 +99,7 @@ def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
         outlines = _outlines(tree, nodes, moments)
     # a place is off by half a bit in 24, a box relative to it as well and twice as large, in three directions
     blur = 2.0**-21 * float(np.max(np.abs(ordered), initial=0.0))
-    return Clusters(parts, nodes, outlines, blur, moments, links)
+    return Clusters(rows, nodes, outlines, blur, moments, links)
 
 
 def _rows(count: int, columns: int, kind: type) -> Any:

@@ -9,7 +9,7 @@ z = 0 and by the four border planes into at most 9 convex pieces a side, each is
 u, v and z being linear on a piece. All terms are positive. What makes it exact to rounding:
 
 - A corner of a piece keeps its barycentric coordinates in the triangle: no area is lost, however small the triangle is
-  against its coordinates, or the piece against the triangle (see `pieces`).
+  against its coordinates, or the piece against the triangle (see `area_share`).
 - It also keeps its z and its four distances beyond the borders. Each is a convex combination of the triangle's corners,
   which are exact differences; on a border just cut its distance is exactly 0 and the opposite one's the plate's width.
   So every coordinate of a piece is accurate to its own size, and a piece lies in one octant, which is what the closed
@@ -32,8 +32,7 @@ from replay.numerics.double_double import difference_of_products
 from replay.numerics.inverse_distance import mean_over_triangle
 from replay.numerics.jit import kernel
 from replay.numerics.log_difference import mean_inverse_linear
-from replay.sensing.capacitive.contact import SATURATED, Borders, borders, contact
-from replay.sensing.capacitive.pieces import (
+from replay.sensing.capacitive.area_share import (
     COLUMNS,
     EAST,
     HEIGHT,
@@ -46,6 +45,7 @@ from replay.sensing.capacitive.pieces import (
     WEST,
     share,
 )
+from replay.sensing.capacitive.contact import SATURATED, Borders, borders, contact
 
 Floats = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.clusters import FOURTH, SECOND, THIRD
 from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.placed_plate import Triple
 
 Floats = NDArray[np.float64]
 Form = tuple[float, float, float, float, float, float]
@@ -32,22 +33,21 @@ def _combine(a: float, t: Form, b: float, q: Form) -> Form:
 
 
 @inlined_kernel
-def mean_by_moments(
-    lanes: Floats, i: int, T: Floats, keep_x: float, keep_y: float, u: float, v: float, z: float
-) -> float:
-    """Return the mean of 1/dist over a node, from its moments up to the fourth, the first columns of lane i.
+def mean_by_moments(lanes: Floats, i: int, T: Floats, sides: tuple[float, float], components: Triple) -> float:
+    """Return the mean of 1/dist [1/m] over a node, from its moments up to the fourth, the first columns of lane i.
 
-    Of the centroid's distance components u, v, z [m], u and v count if keep_x and keep_y are 1, not 0.
+    T is T_plate_body, `sides` those of the centroid's region, and `components` u, v and z [m] of its distance.
 
     With n the unit vector of r in the body's frame, t = (n.d)^2 and q = |Pd|^2 are quadratic forms of d, by their
     coefficients of xx, yy, zz, xy, xz, yz. Orders 2, 3, 4 are the means of (3 t - q)/2, n.d (5 t - 3 q)/2 and
     (35 t^2 - 30 t q + 3 q^2)/8 = 35/8 (t - _T1 q)(t - _T2 q).
     """
+    u, v, z = components
     inverse = 1.0 / math.sqrt(u * u + v * v + z * z)
     n0 = (T[0, 0] * u + T[1, 0] * v + T[2, 0] * z) * inverse
     n1 = (T[0, 1] * u + T[1, 1] * v + T[2, 1] * z) * inverse
     n2 = (T[0, 2] * u + T[1, 2] * v + T[2, 2] * z) * inverse
-    drop_x, drop_y = 1.0 - keep_x, 1.0 - keep_y
+    drop_x, drop_y = 1.0 - abs(sides[0]), 1.0 - abs(sides[1])
     x0, x1, x2, y0, y1, y2 = T[0, 0], T[0, 1], T[0, 2], T[1, 0], T[1, 1], T[1, 2]
     t = (n0 * n0, n1 * n1, n2 * n2, 2.0 * n0 * n1, 2.0 * n0 * n2, 2.0 * n1 * n2)
     q = (

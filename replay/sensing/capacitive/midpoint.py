@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from replay.numerics.jit import kernel
 from replay.sensing.capacitive.contact import SATURATED, contact
+from replay.sensing.capacitive.placed_plate import beyond_borders
 
 Floats = NDArray[np.float64]
 
@@ -16,7 +17,7 @@ Floats = NDArray[np.float64]
 @kernel
 def inverse_distance(x: float, y: float, z: float, half_x: float, half_y: float) -> float:
     """Return 1/dist [1/m] of a point to the plate; inf on the plate."""
-    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+    u, v = beyond_borders(x, y, half_x, half_y)
     return 1.0 / math.sqrt(u * u + v * v + z * z)
 
 

@@ -1,7 +1,8 @@
 """The parts of a sum by their error per effort, worst first: a queue of buckets, half an octave each.
 
-Parts live in slots. A slot's row of `values` holds what was found of its part (see `cluster_bounds`), its row of
-`labels` what it is. The last that came into a bucket leaves it first, so that results repeat.
+A part is a tree node or a triangle whose share is known within an error. Parts live in slots. A slot's row of `values`
+holds what was found of its part (see `lanes`), its row of `labels` what it is. The last that came into a bucket leaves
+it first, so that results repeat.
 """
 
 from __future__ import annotations
@@ -11,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.cluster_bounds import FOUND
-from replay.sensing.capacitive.lanes import LANES
+from replay.numerics.jit import inlined_kernel, kernel
+from replay.sensing.capacitive.lanes import ERROR, FOUND, LANES, LEAST
 from replay.sensing.capacitive.triangle_rules import NO_RULE, PART_ABOVE
 
 Floats = NDArray[np.float64]
@@ -38,10 +38,21 @@ _ONE = int(np.float64(1.0).view(np.int64)) >> _SHIFT
 class Queue(NamedTuple):
     """Room for the parts of one sum."""
 
-    values: Floats  # (capacity, 4)
-    labels: Ints  # (capacity, 3)
+    values: Floats  # (capacity, 4) ERROR, SHIFT, LEAST and REGION, see `lanes`
+    labels: Ints  # (capacity, 3) PART, RULE and NEXT
     heads: Ints  # (256,) first slot of each bucket, or -1
     state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
+
+
+@kernel
+def new_queue(capacity: int) -> Queue:
+    """Return room for so many parts, not yet `empty`."""
+    return Queue(
+        np.empty((capacity, VALUES)),
+        np.empty((capacity, LABELS), np.int64),
+        np.empty(BUCKETS, np.int64),
+        np.empty(3, np.int64),
+    )
 
 
 @inlined_kernel
@@ -59,7 +70,7 @@ def slots_used(queue: Queue) -> int:
 
 @inlined_kernel
 def push(queue: Queue, part: int, rule: int, lanes: Floats, i: int, urgency: float) -> None:
-    """Add a part, found in lane i; urgency >= 0 is its error per effort, of the order of 1 at most."""
+    """Add a part, found in lane i; urgency >= 0 is its error per effort, in units in which it is 1 at most."""
     slot = queue.state[_UNUSED]
     if slot == _NONE:
         slot = queue.state[_USED]
@@ -91,3 +102,14 @@ def pop(queue: Queue) -> int:
         queue.labels[slot, NEXT] = queue.state[_UNUSED]
         queue.state[_UNUSED] = slot
     return slot  # type: ignore[no-any-return]
+
+
+@inlined_kernel
+def doubt_and_least(queue: Queue, least: float) -> tuple[float, float]:
+    """Return the sum of the parts' error bounds, and of their lower bounds and `least` [m]."""
+    doubt = 0.0
+    for slot in range(slots_used(queue)):
+        if queue.labels[slot, RULE] != FREE:
+            doubt += queue.values[slot, ERROR]
+            least += queue.values[slot, LEAST]
+    return doubt, least

@@ -9,46 +9,27 @@ from replay.numerics.double_double import two_sum
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.cluster_bounds import ERROR, FOUND, LEAST, REGION, SHIFT, place, sides_of
-from replay.sensing.capacitive.clusters import MOMENT_COLUMNS, NUMBER, PART_COLUMNS, PLACE, WHOLE, Clusters
+from replay.sensing.capacitive.clusters import MOMENT_COLUMNS, NUMBER, PLACE, TRIANGLE_COLUMNS, WHOLE, Clusters
 from replay.sensing.capacitive.expansion import mean_by_moments
-from replay.sensing.capacitive.lanes import LANES, load, padded
-from replay.sensing.capacitive.part_queue import CLUSTER, FREE, PART, RULE, RULES, VALUES, Queue, slots_used
-from replay.sensing.capacitive.point_sums import SUM, TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.lanes import FOUND, LANES, REGION, SHIFT, SUM, load, padded
+from replay.sensing.capacitive.part_queue import CLUSTER, PART, RULE, RULES, VALUES, slots_used
+from replay.sensing.capacitive.placed_plate import PlacedPlate, place, sides_of
+from replay.sensing.capacitive.point_sums import TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.room import Room
 from replay.sensing.capacitive.triangle_rules import PART_ABOVE, POINTS_1, POINTS_3, POINTS_7, POINTS_16
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _LINE = 8
 """Numbers in a line of memory."""
 
 
-@inlined_kernel
-def doubt_and_least(queue: Queue, least: float) -> tuple[float, float]:
-    """Return the sum of the parts' error bounds, and of their lower bounds and `least` [m]."""
-    doubt = 0.0
-    for slot in range(slots_used(queue)):
-        if queue.labels[slot, RULE] != FREE:
-            doubt += queue.values[slot, ERROR]
-            least += queue.values[slot, LEAST]
-    return doubt, least
-
-
 @leaf_kernel
-def sum_of_parts(
-    clusters: Clusters,
-    queue: Queue,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    lists: Ints,
-    batch: Ints,
-    lanes: Floats,
-) -> tuple[float, float, int, int, int]:
-    """Return the sum of all parts [m], what was lost in rounding it, and how many clusters, triangles in them and other
-    triangles it has. `lists` (RULES + 1, n) is scratch memory.
+def sum_of_parts(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[float, float, int, int, int]:
+    """Return the sum of all parts in the queue [m], what was lost in rounding it, and how many clusters, triangles in
+    them and other triangles it has.
     """
+    queue, lists = room.queue, room.lists
     filled = lists[RULES]
     for rule in range(RULES):
         filled[rule] = 0
@@ -66,7 +47,7 @@ def sum_of_parts(
             total += queue.values[lists[rule, at], SHIFT]
     for begin in range(0, filled[CLUSTER], LANES):
         count = min(filled[CLUSTER] - begin, LANES)
-        value, triangles = _clusters(clusters, queue, lists, begin, count, T, half_x, half_y, batch, lanes)
+        value, triangles = _clusters(clusters.moments, plate, room, begin, count)
         total, e = two_sum(total, value)
         lost += e
         in_clusters += triangles
@@ -74,7 +55,7 @@ def sum_of_parts(
         points = TRIANGLE_3 if rule == POINTS_3 else (TRIANGLE_7 if rule == POINTS_7 else TRIANGLE_16)
         for begin in range(0, filled[rule], LANES):
             count = min(filled[rule] - begin, LANES)
-            value = _triangles(clusters, queue, points, lists, rule, begin, count, T, half_x, half_y, batch, lanes)
+            value = _triangles(clusters.triangles, plate, room, rule, begin, count, points)
             total, e = two_sum(total, value)
             lost += e
     alone = filled[POINTS_1] + filled[PART_ABOVE] + filled[POINTS_3] + filled[POINTS_7] + filled[POINTS_16]
@@ -82,20 +63,11 @@ def sum_of_parts(
 
 
 @inlined_kernel
-def _load_parts(
-    rows: Floats,
-    columns: int,
-    queue: Queue,
-    lists: Ints,
-    rule: int,
-    begin: int,
-    count: int,
-    batch: Ints,
-    lanes: Floats,
-) -> None:
+def _load_parts(rows: Floats, columns: int, room: Room, rule: int, begin: int, count: int) -> None:
     """Write what was found of some parts in the list of a rule, and their rows, to the lanes."""
+    queue, batch, lanes = room.queue, room.batch, room.lanes
     for i in range(count):
-        batch[i] = lists[rule, begin + i]
+        batch[i] = room.lists[rule, begin + i]
     load(queue.values, VALUES, batch, count, lanes, FOUND)
     for i in range(count):
         batch[i] = queue.labels[batch[i], PART]
@@ -103,24 +75,15 @@ def _load_parts(
 
 
 @leaf_kernel
-def _clusters(
-    clusters: Clusters,
-    queue: Queue,
-    lists: Ints,
-    begin: int,
-    count: int,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    batch: Ints,
-    lanes: Floats,
-) -> tuple[float, int]:
+def _clusters(moments: Floats, plate: PlacedPlate, room: Room, begin: int, count: int) -> tuple[float, int]:
     """Return the sum over some clusters in their list [m], and the number of their triangles."""
-    _load_parts(clusters.moments, MOMENT_COLUMNS, queue, lists, CLUSTER, begin, count, batch, lanes)
+    _load_parts(moments, MOMENT_COLUMNS, room, CLUSTER, begin, count)
+    T, half_x, half_y, lanes = plate.T_plate_body, plate.half_x, plate.half_y, room.lanes
     for i in range(padded(count)):
         x, y, z = place(T, lanes[PLACE * LANES + i], lanes[(PLACE + 1) * LANES + i], lanes[(PLACE + 2) * LANES + i])
         sx, sy = sides_of(lanes[(FOUND + REGION) * LANES + i])
-        mean = mean_by_moments(lanes, i, T, abs(sx), abs(sy), abs(sx) * x - sx * half_x, abs(sy) * y - sy * half_y, z)
+        components = (abs(sx) * x - sx * half_x, abs(sy) * y - sy * half_y, z)
+        mean = mean_by_moments(lanes, i, T, (sx, sy), components)
         lanes[SUM * LANES + i] = lanes[WHOLE * LANES + i] * mean + lanes[(FOUND + SHIFT) * LANES + i]
     total, triangles = 0.0, 0
     for i in range(count):
@@ -131,22 +94,12 @@ def _clusters(
 
 @leaf_kernel
 def _triangles(
-    clusters: Clusters,
-    queue: Queue,
-    points: Floats,
-    lists: Ints,
-    rule: int,
-    begin: int,
-    count: int,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    batch: Ints,
-    lanes: Floats,
+    triangles: Floats, plate: PlacedPlate, room: Room, rule: int, begin: int, count: int, points: Floats
 ) -> float:
     """Return the sum over some triangles in the list of a rule [m], each in the region of its centroid."""
-    _load_parts(clusters.parts, PART_COLUMNS, queue, lists, rule, begin, count, batch, lanes)
-    sum_by_points(points, count, T, half_x, half_y, FOUND + REGION, FOUND + SHIFT, lanes)
+    _load_parts(triangles, TRIANGLE_COLUMNS, room, rule, begin, count)
+    lanes = room.lanes
+    sum_by_points(points, count, plate, FOUND + REGION, FOUND + SHIFT, lanes)
     total = 0.0
     for i in range(count):
         total += lanes[SUM * LANES + i]

@@ -8,28 +8,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import place
 from replay.sensing.capacitive.clusters import BEGIN, CENTROID, END, RADIUS, SECOND_CHILD, SIZE, Clusters
 from replay.sensing.capacitive.contact import SATURATED, contact
-from replay.sensing.capacitive.triangle_sum import faces_centre, part_into_plate
+from replay.sensing.capacitive.placed_plate import (
+    PlacedPlate,
+    Triple,
+    beyond_borders,
+    faces_centre,
+    place,
+    place_triangle,
+    write_triangle,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @leaf_kernel
-def suspects(
-    clusters: Clusters, T: Floats, half_x: float, half_y: float, facing: bool, stack: Ints, found: Ints, corners: Floats
-) -> int:
+def suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -> int:
     """Write the triangles that may saturate to `found`; return how many. Only nodes that reach the plate are opened."""
-    nodes, links = clusters.nodes, clusters.links
+    T, half_x, half_y = plate.T_plate_body, plate.half_x, plate.half_y
+    nodes, links, triangles = clusters.nodes, clusters.links, clusters.triangles
     stack[0] = 0
     size, count = 1, 0
     while size > 0:
         size -= 1
         index = stack[size]
         x, y, z = place(T, nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2])
-        u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+        u, v = beyond_borders(x, y, half_x, half_y)
         if math.sqrt(u * u + v * v + z * z) > 1.000001 * nodes[index, RADIUS]:
             continue
         if links[index, SECOND_CHILD] >= 0:
@@ -37,36 +43,35 @@ def suspects(
             size += 2
             continue
         for k in range(links[index, BEGIN], links[index, END]):
-            part_into_plate(T, clusters.parts, k, corners)
-            counts = clusters.parts[k, SIZE] > 0.0 and (not facing or faces_centre(corners))
-            if counts and may_touch(corners, half_x, half_y):
+            a, b, c = place_triangle(T, triangles, k)
+            counts = triangles[k, SIZE] > 0.0 and (not plate.facing or faces_centre(a, b, c))
+            if counts and may_touch(a, b, c, half_x, half_y):
                 found[count] = k
                 count += 1
     return count
 
 
 @inlined_kernel
-def may_touch(corners: Floats, half_x: float, half_y: float) -> bool:
-    """Return False only if `contact` finds a triangle corners[0] CLEAR, by the first of its tests."""
-    z0, z1, z2 = corners[0, 0, 2], corners[0, 1, 2], corners[0, 2, 2]
-    x0, x1, x2 = corners[0, 0, 0], corners[0, 1, 0], corners[0, 2, 0]
-    y0, y1, y2 = corners[0, 0, 1], corners[0, 1, 1], corners[0, 2, 1]
-    return (  # type: ignore[no-any-return]
-        min(z0, z1, z2) <= 0.0 <= max(z0, z1, z2)
-        and min(x0, x1, x2) <= half_x
-        and max(x0, x1, x2) >= -half_x
-        and min(y0, y1, y2) <= half_y
-        and max(y0, y1, y2) >= -half_y
+def may_touch(a: Triple, b: Triple, c: Triple, half_x: float, half_y: float) -> bool:
+    """Return False only if `contact` finds a triangle in the plate's frame CLEAR, by the first of its tests."""
+    return (
+        min(a[2], b[2], c[2]) <= 0.0 <= max(a[2], b[2], c[2])
+        and min(a[0], b[0], c[0]) <= half_x
+        and max(a[0], b[0], c[0]) >= -half_x
+        and min(a[1], b[1], c[1]) <= half_y
+        and max(a[1], b[1], c[1]) >= -half_y
     )
 
 
 @kernel
-def any_saturates(
-    parts: Floats, which: Ints, count: int, T: Floats, half_x: float, half_y: float, both: bool, corners: Floats
-) -> bool:
-    """Return whether one of the triangles which[:count] makes the integral infinite."""
+def any_saturates(triangles: Floats, which: Ints, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
+    """Return whether one of the rows which[:count] of `triangles` makes the integral infinite.
+
+    `triangle` (3, 3) is scratch memory.
+    """
     for i in range(count):
-        part_into_plate(T, parts, which[i], corners)
-        if contact(corners[0], half_x, half_y, both) == SATURATED:
+        a, b, c = place_triangle(plate.T_plate_body, triangles, which[i])
+        write_triangle(a, b, c, triangle)
+        if contact(triangle, plate.half_x, plate.half_y, plate.both) == SATURATED:
             return True
     return False

@@ -43,16 +43,17 @@ from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import place
-from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2, Clusters
-from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.hard_triangles import POOL, Pieces, sum_exactly, sum_hard
-from replay.sensing.capacitive.lanes import COLUMNS, LANES
-from replay.sensing.capacitive.opening import Room, refine
-from replay.sensing.capacitive.part_queue import BUCKETS, LABELS, RULES, VALUES, Queue, empty
+from replay.sensing.capacitive.budget import Tally, budget_of
+from replay.sensing.capacitive.clusters import Clusters
+from replay.sensing.capacitive.hard_triangles import sum_exactly, sum_hard
+from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.opening import refine
+from replay.sensing.capacitive.part_queue import empty
 from replay.sensing.capacitive.part_sum import sum_of_parts
+from replay.sensing.capacitive.placed_plate import PlacedPlate, placed_plate
+from replay.sensing.capacitive.room import Room, new_room
 from replay.sensing.capacitive.saturation import any_saturates, suspects
-from replay.sensing.capacitive.triangle_cuts import PIECE
+from replay.sensing.capacitive.triangle_pieces import Pieces, new_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,12 +63,6 @@ COUNTS = 4
 NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 """Rows of the counters: tree nodes judged, those summed by their moments, triangles in these, and triangles summed one
 by one; triangles behind the plate or facing away, left out node by node, are the rest."""
-
-_FIRST_PARTS = 100.0
-"""A part with more than this fraction of the whole error is opened before the errors are compared."""
-
-_ROUNDING = 1e-15
-"""Rounding of a place in the plate's frame against that of the body."""
 
 
 @kernel
@@ -91,154 +86,64 @@ def sum_tree(
     Returns:
         (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
     """
-    capacity = len(clusters.parts)
-    room = Room(
-        Queue(
-            np.empty((capacity, VALUES)),
-            np.empty((capacity, LABELS), np.int64),
-            np.empty(BUCKETS, np.int64),
-            np.empty(3, np.int64),
-        ),
-        np.empty(capacity + LANES, np.int64),
-        np.empty(capacity, np.int64),
-        np.empty(capacity, np.int64),
-        np.empty(capacity, np.int64),
-        np.empty((RULES + 1, max(capacity, RULES)), np.int64),
-        np.empty(LANES, np.int64),
-        np.zeros(COLUMNS * LANES),
-        np.empty((1, 3, 3)),
-        np.empty(SCRATCH),
-        Pieces(
-            np.empty((POOL, PIECE)),
-            np.empty((3, 2 * LANES, PIECE)),
-            np.empty(3, np.int64),
-            np.empty(LANES, np.int64),
-            np.empty(LANES),
-            np.empty(LANES),
-            np.empty(LANES),
-            np.empty(LANES, np.int64),
-            np.empty(LANES, np.int64),
-            np.empty(LANES, np.int64),
-            np.eye(4),
-        ),
-    )
+    room, pieces = new_room(len(clusters.triangles)), new_pieces()
     n, plates = len(T_plate_body), len(half_sizes)
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
     bound = np.zeros((n, plates))
     for frame in range(n):
         for plate in range(plates):
-            T, half_x, half_y = T_plate_body[frame, plate], half_sizes[plate, 0], half_sizes[plate, 1]
+            half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
+            here = placed_plate(T_plate_body[frame, plate], half_x, half_y, both, facing, clusters.blur)
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _sum_one(
-                clusters, T, half_x, half_y, both, facing, rtol, room, counts
+                clusters, here, rtol, room, pieces, counts
             )
     return integral, touching, bound
 
 
 @kernel
 def _sum_one(
-    clusters: Clusters,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    both: bool,
-    facing: bool,
-    rtol: float,
-    room: Room,
-    counts: Ints,
+    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Ints
 ) -> tuple[float, bool, float]:
-    queue, stack, hard = room.queue, room.stack, room.hard
-    corners = room.corners
-    centre = (
-        -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
-        -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
-        -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
-    )
-    count = suspects(clusters, T, half_x, half_y, facing, stack, hard, corners)
-    if count > 0 and any_saturates(clusters.parts, hard, count, T, half_x, half_y, both, corners):
+    """Return the integral over a body [m], whether it touches the plate, and the bound of the error [m]."""
+    triangles = clusters.triangles
+    count = suspects(clusters, plate, room.stack, room.hard)
+    if count > 0 and any_saturates(triangles, room.hard, count, plate, pieces.triangle):
         return math.inf, True, 0.0
-    empty(queue)
-    ceiling = rtol * _least_of_root(clusters.nodes, T, half_x, half_y)
-    scale = 1.0 / ceiling if ceiling > 0.0 else 1.0
-    blur = clusters.blur + _ROUNDING * (abs(T[0, 3]) + abs(T[1, 3]) + abs(T[2, 3]))
-    stack[0] = 0
-    size = 1
-    judged, alone = 0, 0
-    touching = False
-    total, lost, least, doubt, spent = 0.0, 0.0, 0.0, 0.0, 0.0
+    empty(room.queue)
+    budget, tally, lost = budget_of(clusters.nodes, plate, rtol), Tally(0.0, 0.0, 0.0, 0.0), 0.0
+    room.stack[0] = 0
+    size, judged, alone, touching = 1, 0, 0, False
     while True:
-        count, opened, least, doubt, in_hard = refine(
-            clusters,
-            T,
-            half_x,
-            half_y,
-            both,
-            facing,
-            centre,
-            room,
-            size,
-            ceiling / _FIRST_PARTS,
-            scale,
-            rtol,
-            blur,
-            total,
-            least,
-            doubt,
-            spent,
-        )
+        count, in_hard, opened, tally = refine(clusters, plate, budget, room, size, tally)
         judged += opened
         size = 0
         if count == 0:
             break
         alone += count
+        done, spent, least, doubt = tally
         least_then = least + in_hard
         for begin in range(0, count, LANES):
             several = min(count - begin, LANES)
             # half of the error is for triangles that have no rule; these may take half of what is left of it
             share = max(0.0, 0.5 * rtol * max(least, least_then) - spent) / (2.0 * several)
-            value, error, slow = sum_hard(
-                clusters.parts,
-                hard,
-                begin,
-                several,
-                T,
-                half_x,
-                half_y,
-                both,
-                facing,
-                share,
-                room.pieces,
-                corners,
-                room.lanes,
-            )
+            value, error, slow = sum_hard(triangles, room.hard, begin, several, plate, share, pieces, room.lanes)
             if slow > 0:
-                exact, touches = sum_exactly(
-                    clusters.parts,
-                    room.pieces.slow,
-                    slow,
-                    T,
-                    half_x,
-                    half_y,
-                    both,
-                    facing,
-                    corners,
-                    room.scratch,
-                )
+                exact, touches = sum_exactly(triangles, plate, pieces, slow)
                 touching = touching or touches
                 if exact == math.inf:
                     _add_counts(counts, judged, 0, 0, alone)
                     return math.inf, True, 0.0
                 value += exact
-            total, e = two_sum(total, value)
+            done, e = two_sum(done, value)
             lost += e
             least += value - error
             spent += error
-    parts, lost_in_parts, whole, in_whole, others = sum_of_parts(
-        clusters, queue, T, half_x, half_y, room.lists, room.batch, room.lanes
-    )
+        tally = Tally(done, spent, least, doubt)
+    parts, lost_in_parts, whole, in_whole, others = sum_of_parts(clusters, plate, room)
     _add_counts(counts, judged, whole, in_whole, alone + others)
-    total, e = two_sum(total, parts)
+    total, e = two_sum(tally.done, parts)
     lost += lost_in_parts + e
-    return total + lost, touching, doubt + spent
+    return total + lost, touching, tally.doubt + tally.spent
 
 
 @leaf_kernel
@@ -247,11 +152,3 @@ def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone
     counts[CLUSTERS] += clusters
     counts[IN_CLUSTERS] += in_clusters
     counts[ALONE] += alone
-
-
-@leaf_kernel
-def _least_of_root(nodes: Floats, T: Floats, half_x: float, half_y: float) -> float:
-    x, y, z = place(T, nodes[0, CENTROID], nodes[0, CENTROID + 1], nodes[0, CENTROID + 2])
-    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
-    square = u * u + v * v + z * z + nodes[0, MEAN2]
-    return nodes[0, AREA] / math.sqrt(square) if square > 0.0 else 0.0

@@ -8,19 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import (
-    CLOSEST,
+from replay.sensing.capacitive.cluster_bounds import CLOSEST
+from replay.sensing.capacitive.clusters import REACH, SIZE, SPREAD, TRIANGLE_COLUMNS
+from replay.sensing.capacitive.lanes import (
+    ALLOWED,
     ERROR,
+    FIRST_RULE,
     FOUND,
+    LANES,
     LEAST,
     REGION,
+    RULE_FOUND,
     SHIFT,
     VERDICT,
-    Triple,
-    region_of,
+    load,
+    padded,
 )
-from replay.sensing.capacitive.clusters import PART_COLUMNS, REACH, SIZE, SPREAD
-from replay.sensing.capacitive.lanes import LANES, load, padded
+from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, faces_centre, region_of
 from replay.sensing.capacitive.point_sums import corner_in_lanes
 from replay.sensing.capacitive.triangle_rules import (
     NO_RULE,
@@ -34,49 +38,29 @@ from replay.sensing.capacitive.triangle_rules import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-RULE, FIRST, ALLOWED = VERDICT + 1, VERDICT + 2, VERDICT + 3
-"""Columns of the lanes: the rule that is found; the first that comes into question, and the error it may make [m]."""
-
-
-@inlined_kernel
-def _faces_centre(a: Triple, b: Triple, c: Triple) -> bool:
-    """Return what `faces_centre` returns, by the same operations."""
-    bx, by, bz, cx, cy, cz = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    outward = (by * cz - bz * cy) * a[0] + (bz * cx - bx * cz) * a[1] + (bx * cy - by * cx) * a[2]
-    return outward < 0.0
-
 
 @leaf_kernel
-def judge_triangles(
-    parts: Floats,
-    which: Ints,
-    count: int,
-    T: Floats,
-    half_x: float,
-    half_y: float,
-    both: bool,
-    facing: bool,
-    lanes: Floats,
-) -> None:
-    """Write what is found of the triangles which[:count], verdict and cheapest rule to the lanes.
+def judge_triangles(triangles: Floats, which: Ints, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+    """Write what is found of the rows which[:count] of triangles, verdict and cheapest rule to the lanes.
 
-    FIRST and ALLOWED are given there. A triangle that may touch the plate is always OPEN. What one point sums is found
-    as SHIFT.
+    FIRST_RULE and ALLOWED are given there. A triangle that may touch the plate is always OPEN. What one point sums is
+    found as SHIFT.
     """
-    load(parts, PART_COLUMNS, which, count, lanes, 0)
-    judge_loaded(count, T, half_x, half_y, both, facing, lanes)
+    load(triangles, TRIANGLE_COLUMNS, which, count, lanes, 0)
+    judge_loaded(count, plate, lanes)
 
 
 @inlined_kernel
-def judge_loaded(count: int, T: Floats, half_x: float, half_y: float, both: bool, facing: bool, lanes: Floats) -> None:
+def judge_loaded(count: int, plate: PlacedPlate, lanes: Floats) -> None:
     """Do what `judge_triangles` does, of rows that are in the lanes."""
+    T, half_x, half_y, both, facing = plate.T_plate_body, plate.half_x, plate.half_y, plate.both, plate.facing
     for i in range(padded(count)):
         a, b, c = corner_in_lanes(T, lanes, 0, i), corner_in_lanes(T, lanes, 1, i), corner_in_lanes(T, lanes, 2, i)
         h, spread, area = lanes[REACH * LANES + i], lanes[SPREAD * LANES + i], lanes[SIZE * LANES + i]
-        first, allowed = lanes[FIRST * LANES + i], lanes[ALLOWED * LANES + i]
+        first, allowed = lanes[FIRST_RULE * LANES + i], lanes[ALLOWED * LANES + i]
         low, high = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
         x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
-        u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+        u, v = beyond_borders(x, y, half_x, half_y)
         square = u * u + v * v + z * z
         r = math.sqrt(square)
         inverse, nearest, farthest = 1.0 / r, 1.0 / (r - h), 1.0 / (r + h)
@@ -93,11 +77,11 @@ def judge_loaded(count: int, T: Floats, half_x: float, half_y: float, both: bool
         kept = 1.0 if rule != NO_RULE and r > CLOSEST * h else 0.0
         kept = (1.0 if far_enough else 0.0) if crossing else kept
         # one that does not face the plate may still touch it
-        averted = facing and r > CLOSEST * h and not _faces_centre(a, b, c)
+        averted = facing and r > CLOSEST * h and not faces_centre(a, b, c)
         kept = -1.0 if averted or (not both and high < 0.0) else kept
         lanes[(FOUND + REGION) * LANES + i] = region_of(x, y, half_x, half_y)
         lanes[(FOUND + ERROR) * LANES + i] = wrong if crossing else error
         lanes[(FOUND + SHIFT) * LANES + i] = value if crossing else shift
         lanes[(FOUND + LEAST) * LANES + i] = max(0.0, value - wrong) if crossing else at_least
-        lanes[RULE * LANES + i] = PART_ABOVE if crossing else rule
+        lanes[RULE_FOUND * LANES + i] = PART_ABOVE if crossing else rule
         lanes[VERDICT * LANES + i] = kept

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.cluster_bounds import CLOSEST, Triple
+from replay.sensing.capacitive.cluster_bounds import CLOSEST
+from replay.sensing.capacitive.placed_plate import Triple, beyond_borders
 
 POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE, PART_ABOVE = range(6)
 """What a triangle is summed by: points; or by one point, the part of it that is above z = 0."""
@@ -108,7 +109,7 @@ def part_above(
     x = tx + (x if tip_above else ((px + qx) / 3.0 - part * x) / rest)
     y = ty + (y if tip_above else ((py + qy) / 3.0 - part * y) / rest)
     z = tz + (z if tip_above else ((pz + qz) / 3.0 - part * z) / rest)
-    u, v = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
+    u, v = beyond_borders(x, y, half_x, half_y)
     r = math.sqrt(u * u + v * v + z * z)
     nearest = 1.0 / (r - 2.0 * h)
     bound = area * spread * nearest * nearest * nearest

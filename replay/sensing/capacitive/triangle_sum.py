@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.exact_sign import area_or_zero
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import kernel
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
 from replay.sensing.capacitive.midpoint import midpoint_over_triangle
+from replay.sensing.capacitive.placed_plate import faces_centre, place_triangle, write_triangle
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -26,41 +27,6 @@ def triangle_areas(triangles: Floats) -> Floats:
     for k in range(len(triangles)):
         result[k] = area_or_zero(triangles[k])
     return result
-
-
-@leaf_kernel
-def into_plate(T_plate_body: Floats, triangles: Floats, index: int, result: Floats) -> None:
-    """Write the corners of a triangle of (n, 3, 3) in the plate's frame to the first three rows of `result[0]`.
-
-    Here and elsewhere an array goes with an index instead of a row of it: a view costs as much as the arithmetic.
-    """
-    for k in range(3):
-        x, y, z = triangles[index, k, 0], triangles[index, k, 1], triangles[index, k, 2]
-        for r in range(3):
-            result[0, k, r] = (
-                T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
-            )
-
-
-@leaf_kernel
-def part_into_plate(T_plate_body: Floats, parts: Floats, index: int, result: Floats) -> None:
-    """Do what `into_plate` does, to the last bit, for a row of `Clusters.parts`, which begins with the corners."""
-    for k in range(3):
-        x, y, z = parts[index, 3 * k], parts[index, 3 * k + 1], parts[index, 3 * k + 2]
-        for r in range(3):
-            result[0, k, r] = (
-                T_plate_body[r, 0] * x + T_plate_body[r, 1] * y + T_plate_body[r, 2] * z + T_plate_body[r, 3]
-            )
-
-
-@leaf_kernel
-def faces_centre(corners: Floats) -> bool:
-    """Return whether the outer side of corners[0], in the plate's frame, holds the plate's centre, n.(0 - a) > 0."""
-    ax, ay, az = corners[0, 0, 0], corners[0, 0, 1], corners[0, 0, 2]
-    bx, by, bz = corners[0, 1, 0] - ax, corners[0, 1, 1] - ay, corners[0, 1, 2] - az
-    cx, cy, cz = corners[0, 2, 0] - ax, corners[0, 2, 1] - ay, corners[0, 2, 2] - az
-    outward = (by * cz - bz * cy) * ax + (bz * cx - bx * cz) * ay + (bx * cy - by * cx) * az
-    return outward < 0.0  # type: ignore[no-any-return]
 
 
 @kernel
@@ -87,22 +53,24 @@ def sum_triangles(
     """
     n, plates = len(T_plate_body), len(half_sizes)
     integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
-    scratch, corners = np.empty(SCRATCH), np.empty((1, 3, 3))
+    scratch, corners = np.empty(SCRATCH), np.empty((3, 3))
+    rows = triangles.reshape(len(triangles), 9)
     for frame in range(n):
         for plate in range(plates):
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
             T = T_plate_body[frame, plate]
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
-                into_plate(T, triangles, k, corners)
-                if contact(corners[0], half_x, half_y, both) != CLEAR:
+                a, b, c = place_triangle(T, rows, k)
+                write_triangle(a, b, c, corners)
+                if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True
-                if facing and not faces_centre(corners):
+                if facing and not faces_centre(a, b, c):
                     continue
                 if splits == EXACT:
-                    value = integral_over_triangle(corners[0], areas[k], half_x, half_y, both, scratch)
+                    value = integral_over_triangle(corners, areas[k], half_x, half_y, both, scratch)
                 else:
-                    value = midpoint_over_triangle(corners[0], areas[k], half_x, half_y, both, splits)
+                    value = midpoint_over_triangle(corners, areas[k], half_x, half_y, both, splits)
                 if value == np.inf:
                     total, lost = np.inf, 0.0
                 elif total < np.inf:

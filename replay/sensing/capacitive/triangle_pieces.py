@@ -1,23 +1,71 @@
-"""Cutting triangles in the plate's frame: by z = 0, by the borders, and in four.
+"""Pieces of triangles in the plate's frame: their memory, and how one is cut by z = 0, by a border, or in four.
 
-A piece is a row of a pool, laid out as a row of `Clusters.parts`: its corners and its area, and which triangle it is
-of. The last piece is replaced by what becomes of it.
+A piece is a row of a pool, laid out as a row of `Clusters.triangles`: its corners and its area, and which triangle it
+is of. The last piece is replaced by what becomes of it.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import Triple
+from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 from replay.sensing.capacitive.clusters import CORNERS, SIZE
+from replay.sensing.capacitive.exact import SCRATCH
+from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.placed_plate import Triple
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_PIECES = 48
+"""Pieces that may be made of a triangle before the closed form is called for, which then is cheaper."""
 
 OWNER = SIZE + 1
 PIECE = 16
-"""Columns of a piece; OWNER is the triangle it was cut from."""
+"""Columns of a piece; OWNER is the triangle it was cut from, by its row in what `Pieces` keeps of owners."""
+
+_POOL = LANES * (MOST_PIECES + 4)
+
+
+class Pieces(NamedTuple):
+    """Memory for up to LANES hard triangles, the owners, and their pieces; made once for all poses."""
+
+    pool: Floats  # (_POOL, PIECE) pieces to judge
+    done: Floats  # (3, 2 LANES, PIECE) pieces that are to be summed by 3, 7 and 16 points
+    in_done: Ints  # (3,)
+    rows: Ints  # (LANES,)
+    totals: Floats  # (LANES,) sum of an owner's pieces [m]
+    errors: Floats  # (LANES,) and their error bound [m]
+    densities: Floats  # (LANES,) error that is allowed, over the area [1/m]
+    made: Ints  # (LANES,) pieces made so far; above MOST_PIECES: given up
+    triangles: Ints  # (LANES,) which triangles the owners are
+    slow: Ints  # (LANES,) triangles that need the closed form
+    identity: Floats  # (4, 4) pieces are in the plate's frame
+    triangle: Floats  # (3, 3) a triangle for the closed form
+    scratch: Floats  # SCRATCH, of the closed form
+
+
+@kernel
+def new_pieces() -> Pieces:
+    """Return memory for hard triangles and pieces."""
+    return Pieces(
+        np.empty((_POOL, PIECE)),
+        np.empty((3, 2 * LANES, PIECE)),
+        np.empty(3, np.int64),
+        np.empty(LANES, np.int64),
+        np.empty(LANES),
+        np.empty(LANES),
+        np.empty(LANES),
+        np.empty(LANES, np.int64),
+        np.empty(LANES, np.int64),
+        np.empty(LANES, np.int64),
+        np.eye(4),
+        np.empty((3, 3)),
+        np.empty(SCRATCH),
+    )
 
 
 @inlined_kernel
