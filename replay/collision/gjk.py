@@ -143,7 +143,8 @@ def distance(
 
     Accuracy:
         For the vertices rounded to doubles about a common origin: relative 1e-12, plus 2^-70 of the scene's size
-        (bodies and their offset), proven by `lower_bound`. That rounding is below 3e-15 of the scene's size
+        (bodies and their offset), proven by `lower_bound`, which may stay behind by 1e-16 of the size where bodies all
+        but touch along an edge or a face. That rounding is below 3e-15 of the scene's size
         (tests/collision/test_hard_cases.py). Swapping a and b gives the same status, and the same distance within that.
 
     Source: Gilbert, Johnson, Keerthi 1988; see `gjk_kernel`.

@@ -222,6 +222,14 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
         length = ca
     else:
         length = ab
+    # two long edges of a needle are equal to the last digit: c's foot beyond an end says that the other one is longer
+    edge = minus(b, a)
+    if dot(minus(c, a), edge) < 0.0:
+        a, c = c, a
+        length = norm(minus(b, a))
+    elif dot(minus(c, b), edge) > 0.0:
+        b, c = c, b
+        length = norm(minus(b, a))
     r_a, r_b, r_c = norm(a), norm(b), norm(c)
     if r_a <= 0.0:
         return 2.0 * mean_over_segment(b, c)

@@ -21,7 +21,7 @@ METHOD_REVISIONS: Final = {
     "collision.pieces.exact": 1,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
-    "distance.exact": 1,
+    "distance.exact": 2,
     "distance.rays": 1,
     "distance.thesis": 1,
     "capacitive.tree": 3,

@@ -51,11 +51,12 @@ def plate_integral(
 
     Accuracy: "exact" 2e-14 relative to the integral, for triangles 1e10 times as wide as the plate too
         (test_plate_integral); 4e-11 for a sliver that passes the plate's edge within 1e-12 of its length, 1e-8 for a
-        triangle whose section with z = 0 passes the plate's corner within 1e-16. Whether it is infinite is decided
-        without rounding; a finite one above 1.8e308 m is inf as well. Triangle and plate are scaled by a power of two
-        first, so that their size does not matter; distances below 1e-250 of it are not resolved. "midpoint" has an
-        error of order 4^-splits away from the plate's plane; a triangle that crosses it on side "front" converges at
-        order 2^-splits.
+        triangle whose section with z = 0 passes the plate's corner within 1e-16, 3e-8 for one that leaves the plate's
+        edge by last digits of its coordinates (a needle as narrow as that there: 2e-7 to 4 % of its own 1e-15 m and
+        less). Whether it is infinite is decided without rounding; a finite one above
+        1.8e308 m is inf as well. Triangle and plate are scaled by a power of two first, so that their size does not
+        matter; distances below 1e-250 of it are not resolved. "midpoint" has an error of order 4^-splits away from the
+        plate's plane; a triangle that crosses it on side "front" converges at order 2^-splits.
 
     Source: Huijgens 2015 for the model and "midpoint"; closed forms of all regions derived in `exact` and `numerics`.
     """

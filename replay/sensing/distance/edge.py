@@ -39,11 +39,32 @@ def _radial_edge(a: Vector, b: Vector, length_a: float, length_b: float, cone: C
 
 
 @kernel
-def _in_volume(entry: float, exit: float, wide: bool) -> bool:
-    """Return whether a point is in the sector, or, for a wide cone, not inside the complement's."""
+def _in_volume(x: float, entry: float, exit: float, wide: bool) -> bool:
+    """Return whether a point is in the sector, or, for a wide cone, not inside the complement's.
+
+    Its component x along w decides where the plane only touches the cone: entry and exit are 0 behind the apex as well.
+    """
     if wide:
         return not (entry < 0.0 and exit > 0.0)
-    return entry <= 0.0 and exit >= 0.0
+    return entry <= 0.0 and exit >= 0.0 and x >= 0.0
+
+
+@kernel
+def _foot(a: Vector, e: Vector, area: Vector, doubled: float, squared: float) -> tuple[float, Vector]:
+    """Return distance and place of the foot of the apex on an edge's line.
+
+    On a line along an axis it takes two coordinates from the corner as they are, so that a range that ends on the edge
+    of a box senses it.
+    """
+    if e[1] == 0.0 and e[2] == 0.0:
+        foot = (0.0, a[1], a[2])
+    elif e[2] == 0.0 and e[0] == 0.0:
+        foot = (a[0], 0.0, a[2])
+    elif e[0] == 0.0 and e[1] == 0.0:
+        foot = (a[0], a[1], 0.0)
+    else:
+        return doubled / math.sqrt(squared), scaled(1.0 / squared, cross(e, area))
+    return norm(foot), foot
 
 
 @kernel
@@ -59,10 +80,9 @@ def closest_on_edge(
         return _radial_edge(a, b, length_a, length_b, cone)
 
     # Foot of the apex on the edge
-    off_line = doubled / math.sqrt(squared)
+    off_line, foot = _foot(a, e, area, doubled, squared)
     has_foot = dot(a, e) < 0.0 < dot(b, e)
     nearest = off_line if has_foot else min(length_a, length_b)
-    foot = scaled(1.0 / squared, cross(e, area))
     if has_foot and touches(foot, off_line, size):
         return 0.0, (0.0, 0.0, 0.0), EDGE_FOOT
 
@@ -93,15 +113,15 @@ def closest_on_edge(
 
     # Where foot and corners lie in the sector: before r- (entry > 0), after r+ (exit < 0)
     foot_x, foot_y = dot(foot, w), dot(foot, k)
-    if has_foot and _in_volume(-foot_x * D - foot_y * cos_half, foot_x * D - foot_y * cos_half, wide):
+    if has_foot and _in_volume(foot_x, -foot_x * D - foot_y * cos_half, foot_x * D - foot_y * cos_half, wide):
         return off_line, foot, EDGE_FOOT
     a_x, a_y, b_x, b_y = dot(a, w), dot(a, k), dot(b, w), dot(b, k)
     entry_a, exit_a = -a_x * D - a_y * cos_half, a_x * D - a_y * cos_half
     entry_b, exit_b = -b_x * D - b_y * cos_half, b_x * D - b_y * cos_half
     distance, point, case = np.inf, a, NOTHING
-    if _in_volume(entry_a, exit_a, wide):
+    if _in_volume(a_x, entry_a, exit_a, wide):
         distance, case = length_a, CORNER
-    if length_b < distance and _in_volume(entry_b, exit_b, wide):
+    if length_b < distance and _in_volume(b_x, entry_b, exit_b, wide):
         distance, point, case = length_b, b, CORNER
 
     # Crossings of the border

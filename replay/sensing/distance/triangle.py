@@ -12,7 +12,8 @@ is the complement of a convex cone, and a second local minimum on the conic does
 is farther from R than its radius of curvature). If it does not, the answer lies on an edge (`edge`, cases 3 to 5). The
 axis is never intersected with the plane, and one sign decides between foot and border, so rounding cannot lose both.
 
-Slivers need no case of their own: their normal is formed in twice the working precision. A distance below what rounding
+Slivers need no case of their own: their normal is formed in twice the working precision; those no wider than rounding
+are their edges. A distance below what rounding
 the corners' coordinates can do to it (`TOUCH`) is none: the apex is on the triangle.
 Source: J. Huijgens, TU Eindhoven 2015, for the cases; the forms used are derived here.
 """
@@ -52,7 +53,13 @@ def _beside(p: Vector, corner: Vector, e: Vector, normal: Vector, slack: float) 
 
 @kernel
 def _in_triangle(p: Vector, a: Vector, b: Vector, c: Vector, normal: Vector, slack: float) -> bool:
-    """Return whether p, in the plane of a b c with that unit normal, lies in the triangle or within the slack [m]."""
+    """Return whether p, in the plane of a b c with that unit normal, lies in the triangle or within the slack [m].
+
+    Beyond the tip of a needle p may be far away and yet within the slack of both edges' lines; its coordinates tell.
+    """
+    for k in range(3):
+        if p[k] < min(a[k], b[k], c[k]) - slack or p[k] > max(a[k], b[k], c[k]) + slack:
+            return False
     if _beside(p, a, subtract(b, a), normal, slack):
         return False
     if _beside(p, b, subtract(c, b), normal, slack):
@@ -102,8 +109,12 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
     if squared < _SLIVER * longest * longest:
         area = accurate_normal(a, b, c)
         squared = dot(area, area)
-    if squared > 0.0:
-        turned = scaled(1.0 / math.sqrt(squared), area)
+    # no wider than the slack it is its edges, and its normal may be nothing but rounding
+    slack = _LATERAL * extent
+    if squared > slack * slack * longest:
+        # divided, so that the normal of a plane across an axis is exact, and with it the distance of a wall
+        length = math.sqrt(squared)
+        turned = (area[0] / length, area[1] / length, area[2] / length)
         nearest = a
         if length_b <= length_a and length_b <= length_c:
             nearest = b
@@ -114,7 +125,6 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
         if delta < 0.0:
             delta = -delta
             n = scaled(-1.0, turned)
-        slack = _LATERAL * extent
         foot = scaled(delta, n)
         if touches(foot, delta, size):
             if _in_triangle(foot, a, b, c, turned, slack):
