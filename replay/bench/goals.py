@@ -69,6 +69,7 @@ PROMISES: dict[str, Promise] = {
     "recording.ratio": _at_most("recording carm_bodyguard", _WITHOUT, 1.5, "x"),
     "recording.frame": _at_most("recording, a frame more, worst shipped scene", _WITHOUT, 100.0, "us"),
     "recording.all": _at_most("recording, all in all a frame, worst scene of 100 or more", _WITHOUT, 100.0, "us"),
+    "recording.short": _at_most("recording, all in all a frame, worst scene of fewer", _WITHOUT, 100.0, "us"),
     "diff.equal": _at_most(f"{_DIFF}, equal", "-", 5.0, "s"),
     "diff.different": _at_most(f"{_DIFF}, all different", "-", 30.0, "s"),
     "diff.memory": _at_most(f"{_DIFF}, peak memory", "-", 1024.0, "MiB"),

@@ -24,7 +24,7 @@ _CHECKS: Final[dict[str, Callable[[bytes], int]]] = {
 }
 """Each returns how many faces the file announces at least; ValueError where it is not whole, or not wholly read."""
 
-_CORNERS: Final = ("vertex_indices", "vertex_index")
+_CORNERS: Final = ("vertex_index", "vertex_indices")
 """What PLY files call the corners of a face."""
 
 _ADVICE = "; open it in a mesh editor and save it again as triangles"
@@ -64,7 +64,7 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
     faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     if len(faces) < announced:
         raise MeshError(name, f"announces {announced} faces, of which only {len(faces)} can be read{_ADVICE}")
-    if ending == ".ply" and len(faces) > announced:
+    if ending == ".ply" and announced:
         _check_polygons(name, mesh)
     return vertices, faces
 
@@ -87,17 +87,19 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
 
 
 def _check_polygons(name: str, mesh: Any) -> None:
-    """Refuse polygons of a PLY file that are not convex: trimesh splits them as if they were."""
+    """Refuse a PLY file's polygons that are not convex, which trimesh splits all the same, and faces that it drops."""
     raw = mesh.metadata["_ply_raw"]
+    listed = raw["face"]["data"]  # of a text, lists of any length by name; else rows with fields, lists of one length
+    names = tuple(listed) if isinstance(listed, dict) else listed.dtype.names
+    corners = listed[next((name for name in _CORNERS if name in names), names[0])]
+    corners = corners if isinstance(listed, dict) else corners["f1"]
+    if np.shape(corners)[1:] == (3,):
+        return
     points = np.column_stack([raw["vertex"]["data"][axis] for axis in "xyz"]).astype(np.float64)
-    listed = raw["face"]["data"]
-    if isinstance(listed, dict):  # of a text: lists of any length
-        corners = next(listed[key] for key in _CORNERS if key in listed)
-    else:
-        (key,) = listed.dtype.names if len(listed.dtype.names) == 1 else set(_CORNERS) & set(listed.dtype.names)
-        corners = listed[key]["f1"]
     triangles, sizes = polygons.split(corners)
-    if sizes.all() and triangles.max() < len(points):  # what else there is to say of faces, the mesh's own checks say
+    if not sizes.all():
+        raise MeshError(name, f"face {int(np.argmin(sizes)) + 1} has fewer than three corners{_ADVICE}")
+    if triangles.min() >= 0 and triangles.max() < len(points):  # else the mesh's own checks say so
         folded = polygons.first_folded(points[triangles], sizes)
         if folded is not None:
             raise MeshError(name, f"the polygon of face {folded + 1} {polygons.NOT_CONVEX}")

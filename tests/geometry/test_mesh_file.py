@@ -182,6 +182,9 @@ def test_ply_polygons_are_convex_or_refused(names):
     assert "face 2 is not convex" in refused("a.ply", text + b"3 0 1 4\n5 0 1 2 3 4\n")
     assert "face 1 is not convex" in refused("a.ply", text + b"4 1 2 3 4\n3 0 1 4\n")
     assert len(read_faces("a.ply", text + b"4 3 0 1 2\n3 0 3 4\n")[1]) == 3  # the notch is the first corner
+    assert "face 2 has fewer than three corners" in refused("a.ply", text + b"4 0 1 2 4\n2 0 1\n")
+    for wrong in (b"9", b"-9"):  # an index that is none is for the mesh to refuse
+        assert int(wrong) in read_faces("a.ply", text + b"4 0 1 2 " + wrong + b"\n3 0 1 4\n")[1]
     binary = head.replace(b"FACES", b"1").replace(b"ascii", b"binary_little_endian")
     coordinates = np.array(points, np.float32).tobytes()
     assert "face 1 is not convex" in refused("a.ply", binary + coordinates + struct.pack("<B4i", 4, 1, 2, 3, 4))
