@@ -1,7 +1,8 @@
 """Writing beside computing: blocks are written in a thread of their own while the next ones are computed.
 
 Kernels release the interpreter and so does compression, so that on two cores most of the writing costs no time. One
-thread writes all files: several would take the interpreter from each other, which costs more than it gains.
+thread writes all files: several would take the interpreter from each other, which costs more than it gains. For the
+same reason a run of one block has no thread: nothing is left to be computed when its block is there.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ class Writer(Protocol):
     """What takes blocks and becomes a file."""
 
     def prepare(self) -> None:
-        """Do what needs no block; called once, before the first one."""
+        """Do what needs no block; called once, before the first one, or left to `write` when that is there already."""
 
     def write(self, block: FrameBlock) -> None:
         """Append a block."""
@@ -43,15 +44,17 @@ class WriteBehind:
     The first writer takes all blocks that wait before the next one has its turn, so that at the end of a run it closes
     its file while the others still write.
 
+    Without `threaded` the blocks are kept, and written at the end by whoever put them.
+
     As a context: at its end the writers are finished, then committed in order, or all discarded when there was an
     error; an error in the thread is raised by the next `put` or at the end.
     """
 
-    def __init__(self, writers: Sequence[Writer]) -> None:
+    def __init__(self, writers: Sequence[Writer], *, threaded: bool = True) -> None:
         self._writers = tuple(writers)
-        self._queue: queue.Queue[FrameBlock | None] = queue.Queue(maxsize=_BLOCKS_BEHIND)
+        self._queue: queue.Queue[FrameBlock | None] = queue.Queue(maxsize=_BLOCKS_BEHIND if threaded else 0)
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._work, name="replay-writer", daemon=True)
+        self._thread = threading.Thread(target=self._work, name="replay-writer", daemon=True) if threaded else None
 
     def put(self, block: FrameBlock) -> None:
         """Hand a block over; waits while too many are not yet written."""
@@ -59,13 +62,17 @@ class WriteBehind:
         self._queue.put(block)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        if self._thread is not None:
+            self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._error = self._error or error  # then nothing more is written
         self._queue.put(None)
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
+        else:
+            self._work()
         committed = 0
         try:
             if error is None:
@@ -78,7 +85,7 @@ class WriteBehind:
                 writer.discard()
 
     def _work(self) -> None:
-        for writer in self._writers:
+        for writer in self._writers if self._thread is not None else ():
             self._guard(writer.prepare)  # while the first block is computed
         first, *others = self._writers
         ended = False

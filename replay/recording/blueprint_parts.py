@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 
 from replay.recording import blueprint
-from replay.recording.rerun_columns import Chunks, Column, constants
+from replay.recording.rerun_columns import Chunks, Column, constants, made
 from replay.recording.scene_view import Floats
 
 _EYE, _AXIS = "EyeControls3D", "TimeAxis"  # what the library calls the parts that differ
-
-Parts = dict[str, tuple[Column, ...]]
-"""What is logged, by the path in the blueprint."""
 
 
 class RecordingBlueprint:
@@ -31,12 +28,11 @@ class RecordingBlueprint:
     """
 
     def __init__(self, charts: Collection[str], corners: Floats, end: int) -> None:
-        eye = blueprint.eye_of(corners)
-        own = {_EYE: constants(eye), _AXIS: constants(blueprint.axis_until(end))}
-        first = {"blueprint": _zero()}
+        own = {_EYE: constants(blueprint.eye_of(corners)), _AXIS: _axis(end)}
         self._chunks = Chunks()
-        for path, columns in _parts(frozenset(charts)).items():
-            self._chunks.add(path, first, own.get(path.rpartition("/")[2], columns))
+        for path, chunk in _chunks(frozenset(charts)).items():
+            columns = own.get(path.rpartition("/")[2])
+            self._chunks.take(chunk if columns is None else made(path, _first(), columns))
 
     def to_blueprint(self) -> RecordingBlueprint:
         """Return this."""
@@ -47,25 +43,31 @@ class RecordingBlueprint:
 
 
 class _Recorder:
-    """Takes what a blueprint logs."""
+    """Takes what a blueprint logs: its chunks by the path in the blueprint."""
 
     def __init__(self) -> None:
-        self.parts: Parts = {}
+        self.chunks: dict[str, Any] = {}
 
     def log(self, path: str, archetype: Any) -> None:
-        self.parts[path] = constants(archetype)
+        self.chunks[path] = made(path, _first(), constants(archetype))
 
 
 @functools.cache
-def _parts(charts: frozenset[str]) -> Parts:
+def _chunks(charts: frozenset[str]) -> dict[str, Any]:
     recorder = _Recorder()
     anywhere = blueprint.eye_of(np.eye(3))
     blueprint.recording(charts, anywhere, blueprint.axis_until(1))._log_to_stream(recorder)
-    return recorder.parts
+    return recorder.chunks
+
+
+@functools.lru_cache(maxsize=16)  # runs of a night are often equally long
+def _axis(end: int) -> tuple[Column, ...]:
+    return constants(blueprint.axis_until(end))
 
 
 @functools.cache
-def _zero() -> Any:
+def _first() -> dict[str, Any]:
+    """Return the time of what a blueprint begins with."""
     import pyarrow as pa
 
-    return pa.array([0], pa.int64())
+    return {"blueprint": pa.array([0], pa.int64())}

@@ -64,27 +64,41 @@ def index_of(time: NDArray[np.int64], frames: NDArray[np.int64]) -> Index:
     return {TIMELINE: _flat(pa.duration("ns"), time), "frame": _flat(pa.int64(), frames)}
 
 
-class Chunks:
-    """Takes chunks, and sends many at once: each sending wakes a thread of the library, which costs more than a chunk.
+def made(path: str, index: Index, columns: Iterable[Column]) -> Any:
+    """Return a chunk of an entity; the columns have as many rows as the index, or one row without an index.
 
-    Chunks are made by the function that the library's `Chunk.from_columns` calls.
+    Chunks are made by the function that the library's `Chunk.from_columns` calls, and may be sent more than once.
     """
+    wrap, make = _chunk_type()
+    return wrap(make(path, index, dict(columns)))
+
+
+class Chunks:
+    """Takes chunks and sends them together: each sending wakes a thread of the library, which costs several chunks."""
 
     def __init__(self) -> None:
-        from rerun.chunk import Chunk
-        from rerun_bindings import ChunkInternal
-
-        self._wrap, self._make = Chunk, ChunkInternal.from_columns
-        self._chunks: list[Chunk] = []
+        self._chunks: list[Any] = []
 
     def add(self, path: str, index: Index, columns: Iterable[Column]) -> None:
-        """Take columns of an entity, all of as many rows as the index, or of one row without an index."""
-        self._chunks.append(self._wrap(self._make(path, index, dict(columns))))
+        """Take columns of an entity, as of `made`."""
+        self.take(made(path, index, columns))
+
+    def take(self, chunk: Any) -> None:
+        """Take a chunk."""
+        self._chunks.append(chunk)
 
     def send(self, stream: Any) -> None:
         """Send all that was taken to a rerun.RecordingStream."""
         stream.send_chunks(self._chunks)
         self._chunks = []
+
+
+@functools.cache
+def _chunk_type() -> tuple[Any, Any]:
+    from rerun.chunk import Chunk
+    from rerun_bindings import ChunkInternal
+
+    return Chunk, ChunkInternal.from_columns
 
 
 def entity(*parts: str) -> str:

@@ -20,6 +20,8 @@ from replay.logs.part_file import PartFile
 
 _FLUSH = 60.0  # [s] until what was sent must have been written
 _PIECE = 1 << 20  # bytes
+_LITTLE = 1 << 15  # bytes; a pipe holds more, so that the library need not wait when there are fewer
+_PAUSE = 0.005  # [s] after little, lest every chunk wakes a thread that takes the interpreter from the others
 
 
 class RerunFile:
@@ -43,6 +45,7 @@ class RerunFile:
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._closing: threading.Thread | None = None
+        self._ending = threading.Event()
 
     def open(self, application: str, **options: Any) -> Any:
         """Open the stream and return it; `options` are those of rerun.RecordingStream.save."""
@@ -66,10 +69,11 @@ class RerunFile:
             raise WriteError(str(self.path), f"not all of it was written: {error}") from None
         self._check()
 
-    def finish(self, last: Callable[[], None] | None = None) -> None:
-        """Begin to finish the recording in the background: `last` is done, all is written, the file is made durable."""
+    def finish(self) -> None:
+        """Begin to finish the recording in the background: all is written and the file is made durable."""
         if self.stream is not None and self._closing is None:
-            self._closing = threading.Thread(target=self._close, args=(last,), name="replay-rrd-end", daemon=True)
+            self._ending.set()
+            self._closing = threading.Thread(target=self._close, name="replay-rrd-end", daemon=True)
             self._closing.start()
 
     def commit(self) -> None:
@@ -103,10 +107,10 @@ class RerunFile:
             while data := pipe.read(_PIECE):
                 if self._error is None:  # after an error the rest is only taken, so that nobody waits
                     self._guard(self._file.write, data)
+                if len(data) < _LITTLE:
+                    self._ending.wait(_PAUSE)
 
-    def _close(self, last: Callable[[], None] | None) -> None:
-        if last is not None:
-            self._guard(last)
+    def _close(self) -> None:
         self._guard(self.flush)
         self._guard(self.stream.disconnect)
         if self._thread is not None:

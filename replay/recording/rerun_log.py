@@ -6,7 +6,6 @@ after it, as NaN, so that gaps stay gaps. The bytes differ from run to run; the 
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -95,8 +94,9 @@ class RerunWriter:
         """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
             layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
-            self._file.finish(functools.partial(self._stream.send_blueprint, layout, make_active=False))
+            self._stream.send_blueprint(layout, make_active=False)
             self._stream = None
+            self._file.finish()
 
     def commit(self) -> None:
         """Finish the recording and give the file its name; WriteError when not all of it reached the disk."""

@@ -1,6 +1,7 @@
 """The benchmarks of recordings, of diffs and of starting, small."""
 
 import dataclasses
+import re
 
 import pytest
 
@@ -50,8 +51,8 @@ def test_what_a_frame_more_costs_is_told_apart_from_what_a_recording_costs(monke
     monkeypatch.setattr(recording, "on", made_up(frames, 8e-3, 30e-6))
     report = recording.run(scenes=tuple(frames), rounds=1)
     lines = report.grids[recording.COSTS].lines
-    assert list(lines[1].values()) == ["b", "200", "1.070", "17.5", "70.0", "35.0", "30.0", "8.0"]
-    assert list(lines[4].values()) == ["e", "40", "1.230", "57.5", "230.0", "115.0", "30.0", "8.0"]
+    assert list(lines[1].values()) == ["b", "200", "1.070", "17.5", "70.0", "35.0", "30.0", "8.0", "115"]
+    assert list(lines[4].values()) == ["e", "40", "1.230", "57.5", "230.0", "115.0", "30.0", "8.0", "115"]
     goals = {goal.key: (goal.measured, goal.verdict) for goal in report.goals}
     assert goals == {
         "recording.ratio": (1.05, "met"),
@@ -59,8 +60,12 @@ def test_what_a_frame_more_costs_is_told_apart_from_what_a_recording_costs(monke
         "recording.all": (110.0, "missed"),  # of c
         "recording.short": (230.0, "missed"),  # of e
     }
+    (note,) = report.notes
+    assert re.fullmatch(r"Nobody can record fewer than \d+ frames within 100 us a frame: files .* take [\d.]+ ms\.", note)
     monkeypatch.setattr(recording, "on", made_up(frames, 0.0, 101e-6))
-    verdicts = [goal.verdict for goal in recording.run(scenes=("b",), rounds=1).goals]
+    report = recording.run(scenes=("b",), rounds=1)
+    assert report.grids[recording.COSTS].lines[0]["frames from which it is met"] == "never"
+    verdicts = [goal.verdict for goal in report.goals]
     assert verdicts == ["not measured", "missed", "missed", "not measured"]
 
 

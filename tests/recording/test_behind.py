@@ -26,8 +26,9 @@ def writers(folder: Path) -> tuple[RerunWriter, McapWriter]:
     return rrd, mcap
 
 
-def test_the_thread_writes_the_same_bytes(tmp_path: Path) -> None:
-    with WriteBehind(writers(tmp_path)) as behind:
+@pytest.mark.parametrize("threaded", [True, False])
+def test_the_same_bytes_are_written_with_and_without_a_thread(threaded: bool, tmp_path: Path) -> None:
+    with WriteBehind(writers(tmp_path), threaded=threaded) as behind:
         for block in synthetic.blocks(FRAMES, wild=False):
             behind.put(block)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["made_up.mcap", "made_up.rrd"]
@@ -38,8 +39,9 @@ def test_the_thread_writes_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "made_up.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
-def test_an_error_of_the_simulation_leaves_no_file(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), WriteBehind(writers(tmp_path)) as behind:
+@pytest.mark.parametrize("threaded", [True, False])
+def test_an_error_of_the_simulation_leaves_no_file(threaded: bool, tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), WriteBehind(writers(tmp_path), threaded=threaded) as behind:
         behind.put(next(synthetic.blocks(FRAMES, wild=False)))
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
@@ -118,11 +120,20 @@ def test_the_first_writer_finishes_while_the_next_has_to_write(blocks: int) -> N
     assert log == expected
 
 
-def test_a_full_disk_removes_the_unfinished_file(tmp_path: Path) -> None:
+def test_without_a_thread_each_file_is_closed_before_the_next_is_begun() -> None:
+    log: list[str] = []
+    with WriteBehind([Noting(name, log, lambda: True) for name in "ab"], threaded=False) as behind:
+        behind.put(next(synthetic.blocks(FRAMES, wild=False)))
+        assert log == []
+    assert log == ["a write", "a finish", "b write", "b finish", "a commit", "b commit"]
+
+
+@pytest.mark.parametrize("threaded", [True, False])
+def test_a_full_disk_removes_the_unfinished_file(threaded: bool, tmp_path: Path) -> None:
     for name in ("made_up.mcap", "made_up.rrd"):
         (tmp_path / f"{name}.part").symlink_to("/dev/full")
     for writer in writers(tmp_path):
-        with pytest.raises(WriteError), WriteBehind([writer]) as behind:
+        with pytest.raises(WriteError), WriteBehind([writer], threaded=threaded) as behind:
             for block in synthetic.blocks(FRAMES, wild=False):
                 behind.put(block)
     assert list(tmp_path.iterdir()) == []
