@@ -101,7 +101,7 @@ def exact_sweep(target: Target) -> Sweep:
     cos_half, sin_half = half_angle(APERTURE)
     tree, counts = widen(target.tree, target.triangles), np.zeros(COUNTS, dtype=np.int64)
     return lambda poses, nearest: sweep_exact(
-        target.triangles, tree, poses, cos_half, sin_half, np.inf, 0, nearest, counts
+        target.triangles, tree, poses, cos_half, sin_half, np.zeros(len(poses)), np.inf, 0, nearest, counts
     )
 
 
@@ -112,7 +112,10 @@ def _thesis_sweep(target: Target) -> Sweep:
 
 def _ray_sweep(target: Target, count: int) -> Sweep:
     directions = cap_directions(APERTURE, count)
-    return lambda poses, nearest: sweep_rays(target.triangles, target.tree, poses, directions, np.inf, 0, nearest)
+    triangles, tree = target.triangles, target.tree
+    return lambda poses, nearest: sweep_rays(
+        triangles, tree, poses, directions, np.zeros(len(poses)), np.inf, 0, nearest
+    )
 
 
 def _embree_sweep(bundle: EmbreeBundle, count: int) -> Sweep:
@@ -174,7 +177,7 @@ def read_once(method: str, question: dict[str, Any], *, engine: str = "own", cou
         EmbreeBundle(triangles).sweep(poses, cap_directions(aperture, count), np.inf, 0, nearest)
     else:
         target = make_target("t", 0, triangles)
-        sweep_rays(triangles, target.tree, poses, cap_directions(aperture, count), np.inf, 0, nearest)
+        sweep_rays(triangles, target.tree, poses, cap_directions(aperture, count), np.zeros(1), np.inf, 0, nearest)
     return float(nearest.distance[0])
 
 

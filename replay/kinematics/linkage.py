@@ -93,6 +93,20 @@ class LinkPoses:
         T_ancestor_b = self._chain(up_b)
         return transforms.compose(transforms.invert(T_ancestor_a), T_ancestor_b)
 
+    def way(self, a: int, b: int) -> Array:
+        """Return how long the way from link a to link b over their common ancestor is (n,) [m].
+
+        Rounding of `relative(a, b)` is relative to it, even where the two links stand at the same place. A step counts
+        with its joint's own place, which the joint's motion may cancel.
+        """
+        total = np.zeros(len(self.local))
+        for chain in self.linkage.chains_to_common_ancestor(a, b):
+            for link in chain:
+                step = np.abs(self.local[:, link, :3, 3])
+                joint = np.abs(self.linkage.links[link].T_parent_joint[:3, 3])
+                total += step[:, 0] + step[:, 1] + step[:, 2] + joint[0] + joint[1] + joint[2]
+        return total
+
     def slice(self, begin: int, end: int) -> LinkPoses:
         """Return the poses of frames begin..end-1."""
         return LinkPoses(self.linkage, self.local[begin:end], self.world[begin:end])

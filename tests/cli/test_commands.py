@@ -157,7 +157,7 @@ def test_info_lists_topics_counts_and_provenance(recorded, capsys):
     text = capsys.readouterr().out
     assert "/distance/tip" in text
     assert "replay.DistanceReading" in text
-    assert "distance exact@2" in text
+    assert "distance exact@3" in text
     assert "swing.yaml" in text
     assert run(["info", str(recorded / "swing.mcap"), "--format", "json"]) is ExitCode.FINE
     counts = {topic["topic"]: topic["messages"] for topic in json.loads(capsys.readouterr().out)["topics"]}

@@ -145,7 +145,7 @@ def test_models_come_by_name_or_from_a_file(tmp_path):
         "collision.narrowphase": "gjk@1",
         "collision.pieces": "convex@1",
         "collision.clearance": "never",
-        "distance": "thesis@1",
+        "distance": "thesis@2",
         "capacitive": "midpoint@1",
         "capacitive.splits": "4",
     }

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_float, as_floats
-from replay.sensing.distance.cone import Cone, half_angle
+from replay.sensing.distance.cone import ROUNDING, Cone, half_angle
 from replay.sensing.distance.query import closest_of_all
 
 Array = NDArray[np.float64]
@@ -49,7 +49,8 @@ def closest_in_cone(
         range: largest distance that is sensed [m], 0 to inf.
 
     Returns:
-        `ConeHit`; an apex on a triangle, to the rounding of its corners, reads 0.
+        `ConeHit`; an apex on a triangle, to the rounding of the corners and of the apex, reads 0, whichever way the
+        cone looks: 8 epsilon of the largest coordinate given is on it.
 
     Raises:
         InvalidValue: wrong shape, a value that is not finite, a zero axis, an aperture or range out of bounds.
@@ -73,7 +74,8 @@ def closest_in_cone(
         raise InvalidValue("triangles", "coordinates", "must be small enough that differences to the apex are finite")
     exponent = math.frexp(largest)[1]
     relative = np.ldexp(relative, -exponent)
-    cone = Cone(*direction, *half_angle(aperture))
+    rounding = ROUNDING * max(float(np.max(np.abs(corners), initial=0.0)), float(np.max(np.abs(origin))))
+    cone = Cone(*direction, *half_angle(aperture), math.ldexp(rounding, -exponent))
     distance, point, triangle, case = closest_of_all(relative, (0.0, 0.0, 0.0), cone, _scaled_range(range, exponent))
     if triangle < 0:
         return ConeHit(False, math.nan, np.full(3, math.nan), -1, 0)

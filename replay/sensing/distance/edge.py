@@ -83,7 +83,7 @@ def closest_on_edge(
     off_line, foot = _foot(a, e, area, doubled, squared)
     has_foot = dot(a, e) < 0.0 < dot(b, e)
     nearest = off_line if has_foot else min(length_a, length_b)
-    if has_foot and touches(foot, off_line, size):
+    if has_foot and touches(foot, off_line, size, cone.rounding):
         return 0.0, (0.0, 0.0, 0.0), EDGE_FOOT
 
     # The sector that the plane through apex and edge cuts from the cone, or, above 90 deg, from its complement

@@ -41,6 +41,7 @@ def sweep_exact(
     T_target_sensor: Array,
     cos_half: float,
     sin_half: float,
+    rounding: Array,
     reach: float,
     target: int,
     nearest: Nearest,
@@ -55,6 +56,7 @@ def sweep_exact(
         triangles, tree: of the target, in its link's frame.
         T_target_sensor: (n, 4, 4) sensor in the frame of the target's link.
         cos_half, sin_half: of the cone's half angle.
+        rounding: (n,) how far the apex may be from where it was meant to be [m]: what is no farther than this reads 0.
         reach: the sensor's range [m].
         target: what to write as `nearest.target`.
         nearest: best candidates of the targets before.
@@ -65,13 +67,14 @@ def sweep_exact(
     searched_to, start = -1.0, -1
     for i in range(len(T_target_sensor)):
         limit = min(reach, nearest.distance[i])
-        known = i > 0 and same_pose(T_target_sensor, i, i - 1) and (triangle >= 0 or limit <= searched_to)
+        same = i > 0 and rounding[i] == rounding[i - 1] and same_pose(T_target_sensor, i, i - 1)
+        known = same and (triangle >= 0 or limit <= searched_to)
         if known:
             counts[REPEATED] += 1
         else:
             pose = T_target_sensor[i]
             v = axis_of(pose)
-            cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
+            cone = Cone(v[0], v[1], v[2], cos_half, sin_half, rounding[i])
             apex = (pose[0, 3], pose[1, 3], pose[2, 3])
             distance, offset, triangle, case = closest_in_tree(
                 triangles, tree, apex, cone, limit, start, stack, waiting, bounds, counts
@@ -94,6 +97,7 @@ def sweep_scan(
     T_target_sensor: Array,
     cos_half: float,
     sin_half: float,
+    rounding: Array,
     reach: float,
     target: int,
     nearest: Nearest,
@@ -103,7 +107,7 @@ def sweep_scan(
     for i in range(len(T_target_sensor)):
         pose = T_target_sensor[i]
         v = axis_of(pose)
-        cone = Cone(v[0], v[1], v[2], cos_half, sin_half)
+        cone = Cone(v[0], v[1], v[2], cos_half, sin_half, rounding[i])
         apex = (pose[0, 3], pose[1, 3], pose[2, 3])
         distance, offset, triangle, case = closest_of_all(triangles, apex, cone, reach)
         counts[LOOKED_AT] += len(triangles)

@@ -43,12 +43,12 @@ def on_triangle(triangles: Array, k: int, apex: Vector, cone: Cone) -> tuple[flo
 
 
 @kernel
-def query_slack(tree: WideTree, apex: Vector) -> float:
-    """Return what rounding can change in any distance between the apex and the mesh [m]."""
+def query_slack(tree: WideTree, apex: Vector, rounding: float) -> float:
+    """Return what rounding, the apex's own included, can change in any distance between the apex and the mesh [m]."""
     farthest = 0.0
     for axis in range(3):
         farthest += abs(apex[axis]) + tree.farthest[axis]
-    return SLACK * farthest
+    return SLACK * farthest + rounding
 
 
 @kernel
@@ -106,7 +106,7 @@ def closest_in_tree(
         counts[COMPUTED] += len(triangles)
         return closest_of_all(triangles, apex, cone, reach)
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
-    slack = query_slack(tree, apex)
+    slack = query_slack(tree, apex, cone.rounding)
     boxes, seen, computed = 0, 0, 0
     limit = min(reach, LARGEST)
     if start >= 0:

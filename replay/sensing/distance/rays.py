@@ -25,6 +25,9 @@ from replay.sensing.distance.vectors import Vector, accurate_cross, cross, dot, 
 
 Array = NDArray[np.float64]
 
+_IN_PLANE = 16.0 * EPSILON
+"""Rounding of what d · ((b - a) × (c - a)) is made of, as part of the farthest corner times the longest edge at a."""
+
 
 def cap_directions(aperture: float, count: int) -> Array:
     """Return the unit directions (count, 3) of the rays in the sensor's frame, axis +z.
@@ -59,14 +62,18 @@ def _box_entry(tree: Tree, node: int, origin: Vector, d: Vector, slack: float) -
 
 
 @kernel
-def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
+def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> float:
     """Return how far along the unit direction d from the origin the triangle is hit, from either side; inf when not.
 
     The ray passes each edge on the side that the sign of d · (a × b) tells, so it cannot slip between two triangles.
+    One in the triangle's plane, to rounding, hits nothing: where it meets the plane is noise. A hit no farther than the
+    rounding of the origin [m], before or behind it, is on it.
     """
-    normal = cross(subtract(b, a), subtract(c, a))
+    ab, ac = subtract(b, a), subtract(c, a)
+    normal = cross(ab, ac)
     turn = dot(d, normal)
-    if turn == 0.0:
+    extent = max(norm(a), norm(b), norm(c))
+    if abs(turn) <= _IN_PLANE * extent * max(norm(ab), norm(ac)):
         return np.inf
     sign = 1.0 if turn > 0.0 else -1.0
     slack = 4.0 * EPSILON
@@ -77,13 +84,24 @@ def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
         return np.inf
     if sign * dot(d, accurate_cross(c, a)) < -slack * lc * la:
         return np.inf
-    along = dot(a, normal) / turn
-    return along if along >= 0.0 else np.inf
+    # divided first: the axis meets a wall across it exactly where the wall is
+    along = dot(a, (normal[0] / turn, normal[1] / turn, normal[2] / turn))
+    along = min(max(along, min(dot(d, a), dot(d, b), dot(d, c))), max(dot(d, a), dot(d, b), dot(d, c)))
+    if abs(along) <= rounding:
+        return 0.0
+    return along if along > 0.0 else np.inf
 
 
 @kernel
 def _nearest_hit(
-    triangles: Array, tree: Tree, origin: Vector, d: Vector, limit: float, stack: NDArray[np.int64], slack: float
+    triangles: Array,
+    tree: Tree,
+    origin: Vector,
+    d: Vector,
+    rounding: float,
+    limit: float,
+    stack: NDArray[np.int64],
+    slack: float,
 ) -> tuple[float, int]:
     """Return distance and triangle of the first hit nearer than the limit; inf and -1 when there is none."""
     best, triangle = np.inf, -1
@@ -106,7 +124,7 @@ def _nearest_hit(
             a = (t[0, 0] - origin[0], t[0, 1] - origin[1], t[0, 2] - origin[2])
             b = (t[1, 0] - origin[0], t[1, 1] - origin[1], t[1, 2] - origin[2])
             c = (t[2, 0] - origin[0], t[2, 1] - origin[1], t[2, 2] - origin[2])
-            distance = ray_hit(a, b, c, d)
+            distance = ray_hit(a, b, c, d, rounding)
             if distance <= limit and (distance < best or (distance == best and k < triangle)):
                 best, triangle, limit = distance, k, distance
     return best, triangle
@@ -118,6 +136,7 @@ def sweep_rays(
     tree: Tree,
     T_target_sensor: Array,
     directions: Array,
+    rounding: Array,
     reach: float,
     target: int,
     nearest: Nearest,
@@ -126,7 +145,7 @@ def sweep_rays(
     stack = np.empty(MAX_DEPTH + 1, dtype=np.int64)
     largest = np.finfo(np.float64).max
     for i in range(len(T_target_sensor)):
-        repeated = i > 0 and same_pose(T_target_sensor, i, i - 1)
+        repeated = i > 0 and rounding[i] == rounding[i - 1] and same_pose(T_target_sensor, i, i - 1)
         if repeated and nearest.target[i - 1] == target and nearest.distance[i - 1] < nearest.distance[i]:
             nearest.distance[i] = nearest.distance[i - 1]
             nearest.offset[i] = nearest.offset[i - 1]
@@ -138,6 +157,7 @@ def sweep_rays(
         farthest = 0.0
         for axis in range(3):
             farthest += abs(origin[axis]) + max(abs(tree.lower[0, axis]), abs(tree.upper[0, axis]))
+        slack = SLACK * farthest + rounding[i]
         limit = min(reach, nearest.distance[i], largest)
         for ray in range(len(directions)):
             x, y, z = directions[ray, 0], directions[ray, 1], directions[ray, 2]
@@ -146,7 +166,7 @@ def sweep_rays(
                 pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z,
                 pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z,
             )
-            distance, triangle = _nearest_hit(triangles, tree, origin, d, limit, stack, SLACK * farthest)
+            distance, triangle = _nearest_hit(triangles, tree, origin, d, rounding[i], limit, stack, slack)
             if triangle >= 0 and distance < nearest.distance[i]:
                 limit = distance
                 nearest.distance[i] = distance

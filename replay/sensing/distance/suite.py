@@ -16,7 +16,7 @@ from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.sensing.columns import DistanceColumns
 from replay.sensing.distance.closest import check_aperture, check_range
-from replay.sensing.distance.cone import half_angle
+from replay.sensing.distance.cone import ROUNDING, half_angle
 from replay.sensing.distance.counters import DistanceCounters
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact, sweep_scan
@@ -27,7 +27,7 @@ from replay.sensing.distance.thesis import sweep_thesis
 from replay.sensing.target import Target
 
 Array = NDArray[np.float64]
-Sweep = Callable[["DistanceSensor", int, Array, Nearest], None]
+Sweep = Callable[["DistanceSensor", int, Array, Array, Nearest], None]
 
 METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
@@ -82,6 +82,9 @@ class DistanceSuite:
         savings: False looks at every triangle in every frame, and takes nothing from the frame before; the readings are
             the same bit for bit (tests/test_savings.py).
 
+    An apex on a face of a target reads 0 with it, whichever way the sensor looks, as far as poses are known: to 8
+    epsilon of the way from the sensor over the links to the face (methods "exact", and "rays" with engine "own").
+
     Attributes:
         counters: what was done so far.
 
@@ -109,6 +112,7 @@ class DistanceSuite:
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
         self.method = method
+        self._sizes = [float(np.max(np.abs(target.triangles))) for target in targets]
         self._count = count
         self._savings = savings
         self.counters = DistanceCounters()
@@ -126,6 +130,7 @@ class DistanceSuite:
         frames = len(poses.local)
         columns = empty_columns(frames, len(self.sensors))
         relative: dict[tuple[int, int], Array] = {}
+        way: dict[tuple[int, int], Array] = {}
         for column, sensor in enumerate(self.sensors):
             nearest = nothing_yet(frames)
             T_target_sensor: dict[int, Array] = {}
@@ -135,15 +140,17 @@ class DistanceSuite:
                 links = (target.link, sensor.link)
                 if links not in relative:
                     relative[links] = poses.relative(*links)
+                    way[links] = poses.way(*links)
                 T_target_sensor[index] = transforms.compose(relative[links], sensor.T_link_sensor)
+                rounding = ROUNDING * (way[links] + self._sizes[index] + np.abs(sensor.T_link_sensor[:3, 3]).sum())
                 self.counters.readings += frames
                 self.counters.triangles += frames * len(target.triangles)
                 if self._savings:
-                    self._sweep(sensor, index, T_target_sensor[index], nearest)
+                    self._sweep(sensor, index, T_target_sensor[index], rounding, nearest)
                     continue
                 for frame in range(frames):  # alone, a frame has none before it
                     part = slice(frame, frame + 1)
-                    self._sweep(sensor, index, T_target_sensor[index][part], nearest.of(part))
+                    self._sweep(sensor, index, T_target_sensor[index][part], rounding[part], nearest.of(part))
             write_sensor(columns, column, nearest, self.targets, T_target_sensor, poses, sensor.min_range)
         return columns
 
@@ -162,7 +169,7 @@ class DistanceSuite:
             return self._rays
         bundles = [EmbreeBundle(target.triangles) for target in self.targets]
 
-        def embree(sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+        def embree(sensor: DistanceSensor, index: int, pose: Array, _rounding: Array, nearest: Nearest) -> None:
             bundles[index].sweep(pose, self._pattern(sensor), sensor.range, index, nearest)
 
         return embree
@@ -170,20 +177,19 @@ class DistanceSuite:
     def _pattern(self, sensor: DistanceSensor) -> Array:
         return self._patterns[self.sensors.index(sensor)]
 
-    def _exact(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+    def _exact(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
         target = self.targets[index]
-        cos_half, sin_half = half_angle(sensor.aperture)
-        cone, counts = (cos_half, sin_half, sensor.range), np.zeros(COUNTS, dtype=np.int64)
+        cone, counts = (*half_angle(sensor.aperture), rounding, sensor.range), np.zeros(COUNTS, dtype=np.int64)
         if self._savings:
             sweep_exact(target.triangles, self._wide[index], pose, *cone, index, nearest, counts)
         else:
             sweep_scan(target.triangles, pose, *cone, index, nearest, counts)
         self.counters.add(counts.tolist())
 
-    def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
+    def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, _rounding: Array, nearest: Nearest) -> None:
         cos_half = math.cos(0.5 * sensor.aperture)
         sweep_thesis(self.targets[index].triangles, pose, cos_half, sensor.range, index, nearest)
 
-    def _rays(self, sensor: DistanceSensor, index: int, pose: Array, nearest: Nearest) -> None:
-        triangles = self.targets[index].triangles
-        sweep_rays(triangles, self._trees[index], pose, self._pattern(sensor), sensor.range, index, nearest)
+    def _rays(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
+        triangles, pattern = self.targets[index].triangles, self._pattern(sensor)
+        sweep_rays(triangles, self._trees[index], pose, pattern, rounding, sensor.range, index, nearest)

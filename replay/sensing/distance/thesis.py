@@ -9,13 +9,16 @@ R is the foot of the apex on the triangle's plane, S the point where the cone's 
 5. The corners in the cone, where in the cone means v · x >= |x| cos h.
 The closest of 2 to 5 is the answer.
 
+Where the quadratic's root is a double one (an edge through the apex, a plane that touches the cone) it is right to 1e-7
+of the farthest corner only: the border point may lie that far outside the cone, and the reading be that much too near.
+
 Its failures are kept, for they are what a comparison should show. A plane parallel to the axis has no S, one that
 leaves the axis slowly has it behind the apex, so that the ray from R runs away from the cone; when R = S there is no
 ray: step 2 then finds nothing, and the reading is too far or missing. Where the quadratic's leading coefficient
-vanishes (an edge parallel to the border) step 3 finds nothing. Below apertures of about 2e-8 rad cos h rounds to 1: a
-quarter of the triangles in front of a needle are missed, the others are right to 1e-6 only. Above 180 deg steps 2 and 3
-look at the mirrored cone. A triangle without area has edges only. All of this is measured in
-tests/sensing/distance/test_models.py.
+vanishes (an edge parallel to the border, to rounding) step 3 finds nothing. An apex on a face reads what rounding says:
+0, the gap, or what is behind. Below apertures of about 2e-8 rad cos h rounds to 1: a quarter of the triangles in front
+of a needle are missed, the others are right to 1e-6 only. Above 180 deg steps 2 and 3 look at the mirrored cone. A
+triangle without area has edges only. Measured in tests/sensing/distance/test_models.py.
 Source: J. Huijgens, TU Eindhoven 2015, chapter on the distance sensor.
 """
 
@@ -27,12 +30,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import kernel
-from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, FOOT, NOTHING
+from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, EPSILON, FOOT, NOTHING
 from replay.sensing.distance.exact import axis_of, same_pose
 from replay.sensing.distance.readings import Nearest
 from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
 
 Array = NDArray[np.float64]
+
+_VANISHING = 8.0 * EPSILON
+"""Rounding of the quadratic's leading coefficient, as part of the direction's square: less than this is nothing."""
 
 
 @kernel
@@ -52,7 +58,7 @@ def _roots(p: Vector, e: Vector, v: Vector, cos_half: float) -> tuple[float, flo
     middle = dot(v, p) * dot(v, e) - square * dot(p, e)
     last = dot(v, p) * dot(v, p) - square * dot(p, p)
     discriminant = middle * middle - leading * last
-    if leading == 0.0 or not discriminant >= 0.0:
+    if abs(leading) <= _VANISHING * dot(e, e) or not discriminant >= 0.0:
         return np.nan, np.nan
     root = math.sqrt(discriminant)
     t1, t2 = (-middle - root) / leading, (-middle + root) / leading

@@ -14,7 +14,7 @@ axis is never intersected with the plane, and one sign decides between foot and 
 
 Slivers need no case of their own: their normal is formed in twice the working precision; those no wider than rounding
 are their edges. A distance below what rounding
-the corners' coordinates can do to it (`TOUCH`) is none: the apex is on the triangle.
+the corners' coordinates (`TOUCH`) or the apex (`ROUNDING`) can do to it is none: the apex is on the triangle.
 Source: J. Huijgens, TU Eindhoven 2015, for the cases; the forms used are derived here.
 """
 
@@ -97,7 +97,8 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
         max(abs(a[1]), abs(b[1]), abs(c[1])),
         max(abs(a[2]), abs(b[2]), abs(c[2])),
     )
-    if touches(a, length_a, size) or touches(b, length_b, size) or touches(c, length_c, size):
+    near = cone.rounding
+    if touches(a, length_a, size, near) or touches(b, length_b, size, near) or touches(c, length_c, size, near):
         return 0.0, (0.0, 0.0, 0.0), CORNER
 
     # Plane
@@ -126,7 +127,7 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
             delta = -delta
             n = scaled(-1.0, turned)
         foot = scaled(delta, n)
-        if touches(foot, delta, size):
+        if touches(foot, delta, size, near):
             if _in_triangle(foot, a, b, c, turned, slack):
                 return 0.0, (0.0, 0.0, 0.0), FOOT
         else:

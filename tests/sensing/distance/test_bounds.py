@@ -32,8 +32,10 @@ def compare(triangles, apex, axis, aperture):
     tree = widen(triangle_tree(triangles), triangles)
     of_boxes, of_leaves = np.empty((len(tree.boxes), LANES)), np.empty((len(tree.corners), LANES))
     distances = np.empty(len(triangles))
-    slack = query_slack(tree, tuple(apex))
-    every_bound(triangles, tree, tuple(apex), Cone(*axis, *half_angle(aperture)), slack, of_boxes, of_leaves, distances)
+    slack = query_slack(tree, tuple(apex), 0.0)
+    every_bound(
+        triangles, tree, tuple(apex), Cone(*axis, *half_angle(aperture), 0.0), slack, of_boxes, of_leaves, distances
+    )
     held = tree.indices >= 0
     exact_of_leaves = np.where(held, distances[tree.indices], np.inf)
     exact_of_boxes = np.full(of_boxes.shape, np.inf)

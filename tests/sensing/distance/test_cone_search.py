@@ -20,7 +20,7 @@ def exact_all(triangles, axes, half_angles):
     distances, points, cases = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int64)
     for i in range(n):
         t = triangles[i]
-        cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1])
+        cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1], 0.0)
         a, b, c = (t[0, 0], t[0, 1], t[0, 2]), (t[1, 0], t[1, 1], t[1, 2]), (t[2, 0], t[2, 1], t[2, 2])
         distances[i], point, cases[i] = closest_on_triangle(a, b, c, cone)
         for k in range(3):

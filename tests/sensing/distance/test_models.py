@@ -113,6 +113,36 @@ def test_rays_are_never_too_near_and_close_in_with_their_number():
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2] > 0.0
 
 
+def test_a_ray_in_the_plane_of_a_triangle_hits_nothing():
+    # the sensor stands in the triangles' plane beside them and looks along it: rays met the plane at noise
+    rng = np.random.default_rng(2)
+    places = 0.1 * rng.integers(-3, 4, (300, 3, 2)) - 0.025 * rng.integers(-12, 13, (300, 1, 2))
+    triangles = np.stack([places[..., 0] * math.cos(0.6), places[..., 1], places[..., 0] * math.sin(0.6)], axis=-1)
+    down = np.tile([0.0, -1.0, 0.0], (300, 1))
+    beside = readings(triangles, down, np.full(300, 2.0 * math.pi))[0] > 0.0
+    assert beside.sum() > 200
+    assert np.isnan(readings(triangles, down, np.full(300, 0.17), method="rays", count=7)[0][beside]).all()
+
+
+def test_rays_meet_a_wall_across_the_axis_where_it_is():
+    for reach in (0.1, 0.3, 0.7, 1.1, 1.0 / 3.0):
+        wall = np.array([[-0.3, -0.7, reach], [0.25, -0.7, reach], [0.2, 0.9, reach]])
+        assert readings([wall], [[0.0, 0.0, 1.0]], [0.2], method="rays", count=7)[0] == reach
+
+
+def test_thesis_reads_nothing_on_an_edge_along_the_border():
+    # the first edges run along the border of a cone of 90 deg about z: their leading coefficient was rounding, not 0
+    triangles = [
+        [[0.4, 0.5, 0.5], [0.7, 0.5, 0.2], [0.6, 1.0, -0.2]],
+        [[-0.8, 0.1, -0.5], [-0.2, 0.1, 0.1], [-0.1, 0.9, -1.2]],
+        [[0.2, -0.2, 0.2], [-0.1, -0.2, 0.5], [1.0, -1.0, -0.5]],
+    ]
+    axes, apertures = np.tile([0.0, 0.0, 1.0], (3, 1)), np.full(3, 0.5 * math.pi)
+    thesis, _ = readings(np.array(triangles), axes, apertures, method="thesis")
+    assert np.isnan(thesis[:2]).all()
+    assert thesis[2] > readings(np.array(triangles), axes, apertures)[0][2]  # too far, as documented
+
+
 def test_own_rays_and_embree_shoot_the_same_bundle():
     poses = orbit(40)
     sensor = DistanceSensor("s", 1, transforms.identity(), 0.5, range=3.5)

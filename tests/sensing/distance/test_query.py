@@ -14,11 +14,11 @@ from tests.sensing.distance.meshes import grid_of_cubes, torus
 
 
 @kernel
-def all_answers(triangles, tree, apexes, axes, half_angles, reaches, starts, walk):
+def all_answers(triangles, tree, apexes, axes, half_angles, reaches, starts, walk, rounding):
     stack, waiting, bounds = np.empty(MAX_WAITING, dtype=np.int64), np.empty(MAX_WAITING), np.empty(LANES)
     answers, counts = np.empty((len(apexes), 6)), np.zeros(COUNTS, dtype=np.int64)
     for i in range(len(apexes)):
-        cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1])
+        cone = Cone(axes[i, 0], axes[i, 1], axes[i, 2], half_angles[i, 0], half_angles[i, 1], rounding)
         apex = (apexes[i, 0], apexes[i, 1], apexes[i, 2])
         if walk:
             distance, x, triangle, case = closest_in_tree(
@@ -53,8 +53,9 @@ MESHES = {
 }
 
 
+@pytest.mark.parametrize("rounding", [0.0, 0.02])
 @pytest.mark.parametrize("name", MESHES)
-def test_walk_equals_scan_bit_for_bit(name):
+def test_walk_equals_scan_bit_for_bit(name, rounding):
     rng = np.random.default_rng(20152)
     triangles = np.ascontiguousarray(MESHES[name](rng))
     tree = widen(triangle_tree(triangles), triangles)
@@ -71,23 +72,25 @@ def test_walk_equals_scan_bit_for_bit(name):
     reaches = np.where(rng.uniform(size=n) < 0.3, size * rng.uniform(0.0, 2.0, n), np.inf)
     nobody = np.full(n, -1)
 
-    scan = all_answers(triangles, tree, apexes, axes, half_angles, reaches, nobody, False)
-    walk = all_answers(triangles, tree, apexes, axes, half_angles, reaches, nobody, True)
+    scan = all_answers(triangles, tree, apexes, axes, half_angles, reaches, nobody, False, rounding)
+    walk = all_answers(triangles, tree, apexes, axes, half_angles, reaches, nobody, True, rounding)
     np.testing.assert_array_equal(walk, scan)
     assert 0.2 < np.mean(scan[:, 1] >= 0) < 0.999
 
     anywhere = rng.integers(len(triangles), size=n)
     np.testing.assert_array_equal(
-        all_answers(triangles, tree, apexes, axes, half_angles, reaches, anywhere, True), scan
+        all_answers(triangles, tree, apexes, axes, half_angles, reaches, anywhere, True, rounding), scan
     )
     answer = scan[:, 1].astype(np.int64)
-    np.testing.assert_array_equal(all_answers(triangles, tree, apexes, axes, half_angles, reaches, answer, True), scan)
+    np.testing.assert_array_equal(
+        all_answers(triangles, tree, apexes, axes, half_angles, reaches, answer, True, rounding), scan
+    )
 
     # Range is inclusive: a reach of exactly the answer finds it again, one unit less in the last place does not
     found = scan[:, 1] >= 0
     exactly = np.where(found, scan[:, 0], 0.0)
-    again = all_answers(triangles, tree, apexes, axes, half_angles, exactly, nobody, True)
+    again = all_answers(triangles, tree, apexes, axes, half_angles, exactly, nobody, True, rounding)
     np.testing.assert_array_equal(again[found], scan[found])
     less = np.where(found & (exactly > 0), np.nextafter(exactly, -1.0), 0.0)
-    none = all_answers(triangles, tree, apexes, axes, half_angles, less, nobody, True)
+    none = all_answers(triangles, tree, apexes, axes, half_angles, less, nobody, True, rounding)
     assert (none[found & (exactly > 0), 1] == -1).all()

@@ -1,5 +1,6 @@
 """Sensors on moving links: the block's columns are the exact readings of every frame, whoever moves and wherever."""
 
+import itertools
 import math
 
 import numpy as np
@@ -59,6 +60,36 @@ SENSORS = [
     DistanceSensor("ground", 1, at(0, 0, -2.0), 0.9, range=2.2, min_range=1.8),
     DistanceSensor("no_ring", 0, at(0, 0, 0, DOWN), 0.9, ignored_links=frozenset({3})),
 ]
+
+
+@pytest.mark.parametrize("method", ["exact", "rays"])
+@pytest.mark.parametrize("savings", [True, False])
+def test_an_apex_on_a_face_up_to_rounding_reads_zero_whatever_carries_both(method, savings):
+    # the room's far walls are what was read where rounding put the face behind the apex
+    rng = np.random.default_rng(4)
+    turns = rng.uniform(-3.0, 3.0, (12, 3)).round(1)
+    room = make_target("room/walls", 0, 30.0 * grid_of_cubes(1) - 15.0)
+    for turn, face in itertools.product(turns, range(3)):
+        steps = rng.uniform(-2.0, 2.0, (5, 3)).round(1)
+        size = rng.uniform(0.01, 0.5, 3).round(2)
+        plate = make_target("plate/skin", 2, size * (2.0 * grid_of_cubes(1) - 1.0))
+        spot = size * rng.uniform(-0.9, 0.9, 3)
+        spot[face] = size[face]
+        first, second = at(*steps[0], *turn[:1]), at(*steps[1], *turn[1:2], axis=(1.0, 0.0, 0.0))
+        apex = transforms.apply(transforms.compose(first, second), spot)
+        linkage = Linkage(
+            [
+                Link("a_room", None, HERE, Joint("a_room")),
+                Link("arm", None, first, Joint("arm")),
+                Link("plate", "arm", second, Joint("plate")),
+                Link("stand", None, at(*steps[2]), Joint("stand")),
+                Link("top", "stand", at(*(apex - steps[2]), turn[2]), Joint("top")),
+            ]
+        )
+        sensor = DistanceSensor("s", 4, HERE, 0.6)
+        suite = DistanceSuite([sensor], [plate, room], method=method, count=61, savings=savings)
+        columns = suite.run(linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4))))
+        assert (columns.distance[0, 0], columns.shape[0, 0]) == (0.0, 0)
 
 
 def test_every_frame_is_the_closest_of_all_targets():
