@@ -141,12 +141,14 @@ def _race(
     poses = np.ascontiguousarray(T_plate_body[:, None])
     areas, tree = triangle_areas(triangles), triangle_tree(triangles)
     clusters = make_clusters(triangles, tree)
-    truth = sum_triangles(triangles, areas, poses, half, False, False, EXACT)[0].ravel()
+    truth = sum_triangles(triangles, areas, poses, np.zeros(len(poses)), half, False, False, EXACT)[0].ravel()
     apart = np.flatnonzero(np.isfinite(truth))[:most]
     poses, truth = np.ascontiguousarray(poses[apart]), truth[apart]
 
     def by_tree(rtol: float) -> Answer:
-        return lambda: sum_tree(clusters, poses, half, False, False, rtol, np.zeros(COUNTS, np.int64))[0][:, 0]
+        return lambda: sum_tree(
+            clusters, poses, np.zeros(len(poses)), half, False, False, rtol, np.zeros(COUNTS, np.int64)
+        )[0][:, 0]
 
     def contender(name: str, answer: Answer, tolerance: float) -> Contender:
         return Contender(name, answer, len(poses), lambda found: judge(found, truth, tolerance))
@@ -158,7 +160,7 @@ def _race(
 
 
 def _by_triangles(triangles: Floats, areas: Floats, poses: Floats, splits: int, half: Floats = PLATE) -> Answer:
-    return lambda: sum_triangles(triangles, areas, poses, half, False, False, splits)[0][:, 0]
+    return lambda: sum_triangles(triangles, areas, poses, np.zeros(len(poses)), half, False, False, splits)[0][:, 0]
 
 
 def judge(found: Floats, truth: Floats, tolerance: float) -> Check:

@@ -60,7 +60,7 @@ def _plate_tree(question: dict[str, Any]) -> list[float]:
     half, both = np.array([question["half_size"]]), question["side"] == "both"
     here = np.identity(4)[None, None]
     clusters, counts = make_clusters(triangles, tree), np.zeros(COUNTS, dtype=np.int64)
-    return [float(sum_tree(clusters, here, half, both, False, 1e-6, counts)[0][0, 0])]
+    return [float(sum_tree(clusters, here, np.zeros(len(here)), half, both, False, 1e-6, counts)[0][0, 0])]
 
 
 def _obb(method: Literal["triangles", "vertices"], question: dict[str, Any]) -> list[float]:

@@ -14,6 +14,12 @@ from replay.numerics import transforms
 
 Array = NDArray[np.float64]
 
+POSE_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+"""Rounding of the place of one link in another, as part of the way between them (`LinkPoses.way`).
+
+Chains of up to eight links, turned every way, were off by at most 1.1 epsilon of the sum of their steps.
+"""
+
 
 class JointType(enum.Enum):
     """How a link may move relative to its parent link (or, for the root of a tree, to the world)."""

@@ -113,6 +113,40 @@ def test_a_body_through_the_plate_saturates_and_one_that_rests_on_a_corner_only_
     assert (columns.output_voltage[:2, 0] > 0.0).all()
 
 
+@pytest.mark.parametrize("method", ["tree", "exact", "midpoint"])
+def test_a_face_flush_with_the_plate_up_to_rounding_is_in_its_plane_whatever_carries_both(method):
+    # its height came out as 0, or a last digit before or behind the plate: nothing, 1e15 times too much, or nothing
+    rng = np.random.default_rng(6)
+    block = cuboid((0.6, 0.8, 0.4)).triangles
+    readings = []
+    for turn in rng.uniform(-3.0, 3.0, (8, 3)).round(1):
+        steps = rng.uniform(-2.0, 2.0, (3, 3)).round(1)
+        first = transforms.compose(
+            transforms.from_translation(steps[0]), transforms.from_axis_angle(np.array([0.0, 0.0, 1.0]), turn[0])
+        )
+        second = transforms.from_translation(steps[1])
+        flush = transforms.compose(
+            transforms.compose(first, second), transforms.from_translation(np.array([0.01, 0.02, -0.2]))
+        )
+        flush[:3, 3] -= steps[2]
+        linkage = Linkage(
+            [
+                Link("arm", None, first, Joint("arm")),
+                Link("block", "arm", second, Joint("block")),
+                Link("stand", None, transforms.from_translation(steps[2]), Joint("stand")),
+            ]
+        )
+        plates = (Plate("p", flush, np.array([0.1, 0.15])),)
+        sensors = [CapacitiveSensor(side, 2, plates, coupling=10e-12, side=side) for side in ("both", "front")]
+        suite = CapacitiveSuite(sensors, [make_target("block/skin", 1, block)], method=method, splits=3)
+        columns = suite.run(linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4))))
+        assert columns.touching.tolist() == [[True, True]]
+        if method != "midpoint":
+            assert columns.saturated.tolist() == [[True, False]]
+        readings.append(columns.capacitance[0, 1])
+    np.testing.assert_allclose(readings, readings[0], rtol=1e-6)
+
+
 def test_a_machine_far_from_the_origin_reads_the_same():
     linkage, targets, sensor = _scene()
     deaf = CapacitiveSensor(

@@ -63,10 +63,12 @@ def test_the_error_never_exceeds_the_tolerance(body, lowest, highest, both, faci
     tree = triangle_tree(body)
     clusters = make_clusters(body, tree)
     T = _poses(body, 25, lowest, highest, seed=17)
-    exact, touching = sum_triangles(body, triangle_areas(body), T, _HALF_SIZES, both, facing, EXACT)
+    exact, touching = sum_triangles(body, triangle_areas(body), T, np.zeros(len(T)), _HALF_SIZES, both, facing, EXACT)
     finite = np.isfinite(exact)
     for rtol in (1e-1, 1e-3, 1e-6, 1e-9):
-        value, touches, bound = sum_tree(clusters, T, _HALF_SIZES, both, facing, rtol, np.zeros(COUNTS, np.int64))
+        value, touches, bound = sum_tree(
+            clusters, T, np.zeros(len(T)), _HALF_SIZES, both, facing, rtol, np.zeros(COUNTS, np.int64)
+        )
         np.testing.assert_array_equal(np.isinf(value), ~finite)
         np.testing.assert_array_equal(touches, touching)
         expected, error = exact[finite], np.abs(value[finite] - exact[finite])
@@ -105,8 +107,8 @@ def test_a_body_behind_the_plate_counts_on_side_both_only(body):
     tree = triangle_tree(body)
     clusters = make_clusters(body, tree)
     T = transforms.from_translation(np.array([0.0, 0.0, -2.0]))[None, None].repeat(2, axis=1)
-    front, _, _ = sum_tree(clusters, T, _HALF_SIZES, False, False, 1e-6, np.zeros(COUNTS, np.int64))
-    both, _, _ = sum_tree(clusters, T, _HALF_SIZES, True, False, 1e-6, np.zeros(COUNTS, np.int64))
+    front, _, _ = sum_tree(clusters, T, np.zeros(len(T)), _HALF_SIZES, False, False, 1e-6, np.zeros(COUNTS, np.int64))
+    both, _, _ = sum_tree(clusters, T, np.zeros(len(T)), _HALF_SIZES, True, False, 1e-6, np.zeros(COUNTS, np.int64))
     assert (front == 0.0).all()
     assert (both > 0.0).all()
 
@@ -135,9 +137,13 @@ def test_sizes_that_half_the_digits_do_not_hold_are_summed_within_the_tolerance(
     T = _poses(body, 6, -2.0, 0.5, seed=23)
     T[..., :3, 3] *= scale
     scaled = scale * body
-    exact, _ = sum_triangles(scaled, triangle_areas(scaled), T, scale * _HALF_SIZES, False, False, EXACT)
+    exact, _ = sum_triangles(
+        scaled, triangle_areas(scaled), T, np.zeros(len(T)), scale * _HALF_SIZES, False, False, EXACT
+    )
     clusters = make_clusters(scaled, triangle_tree(scaled))
-    value, _, bound = sum_tree(clusters, T, scale * _HALF_SIZES, False, False, 1e-4, np.zeros(COUNTS, np.int64))
+    value, _, bound = sum_tree(
+        clusters, T, np.zeros(len(T)), scale * _HALF_SIZES, False, False, 1e-4, np.zeros(COUNTS, np.int64)
+    )
     finite = np.isfinite(exact)
     assert finite.sum() >= 6
     assert (np.abs(value[finite] - exact[finite]) <= bound[finite] + 1e-13 * exact[finite]).all()

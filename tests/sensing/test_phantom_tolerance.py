@@ -50,11 +50,15 @@ def _worst(body, regime, count, both, facing, seed):
     if regime == "touching":
         T = _back_off(T, triangles, np.geomspace(near, far, count))
     T = np.ascontiguousarray(T[:, None])
-    exact, touching = sum_triangles(triangles, triangle_areas(triangles), T, _PLATE, both, facing, EXACT)
+    exact, touching = sum_triangles(
+        triangles, triangle_areas(triangles), T, np.zeros(len(T)), _PLATE, both, facing, EXACT
+    )
     finite = np.isfinite(exact) & (exact > 0.0)
     worst = 0.0
     for rtol in (1e-2, 1e-4, 1e-6, 1e-9):
-        value, touches, bound = sum_tree(clusters, T, _PLATE, both, facing, rtol, np.zeros(COUNTS, np.int64))
+        value, touches, bound = sum_tree(
+            clusters, T, np.zeros(len(T)), _PLATE, both, facing, rtol, np.zeros(COUNTS, np.int64)
+        )
         np.testing.assert_array_equal(touches, touching)
         np.testing.assert_array_equal(value[~finite], exact[~finite])
         error = np.abs(value[finite] - exact[finite])

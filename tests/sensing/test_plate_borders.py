@@ -146,7 +146,14 @@ def test_the_tree_counts_pieces_in_border_planes_once(both):
         for rtol in (1e-2, 1e-6, 1e-12):
             tree = triangle_tree(body)
             value, _, bound = sum_tree(
-                make_clusters(body, tree), T, np.array([half]), both, False, rtol, np.zeros(COUNTS, np.int64)
+                make_clusters(body, tree),
+                T,
+                np.zeros(len(T)),
+                np.array([half]),
+                both,
+                False,
+                rtol,
+                np.zeros(COUNTS, np.int64),
             )
             assert value[0, 0] == pytest.approx(expected.sum(), rel=rtol)
             assert abs(value[0, 0] - expected.sum()) <= bound[0, 0] + 1e-13 * expected.sum()
@@ -154,5 +161,7 @@ def test_the_tree_counts_pieces_in_border_planes_once(both):
             tree = triangle_tree(triangle[None])
             clusters = make_clusters(triangle[None], tree)
             for rtol in (1e-3, 1e-8):
-                alone = sum_tree(clusters, T, np.array([half]), both, False, rtol, np.zeros(COUNTS, np.int64))[0][0, 0]
+                alone = sum_tree(
+                    clusters, T, np.zeros(len(T)), np.array([half]), both, False, rtol, np.zeros(COUNTS, np.int64)
+                )[0][0, 0]
                 assert alone == pytest.approx(value, rel=rtol)

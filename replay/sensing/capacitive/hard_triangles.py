@@ -69,7 +69,7 @@ def sum_hard(
     slow, size, owners = 0, 0, 0
     for at in range(begin, begin + count):
         k = hard[at]
-        a, b, c = place_triangle(plate.T_plate_body, triangles, k)
+        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, k)
         area, low, high = triangles[k, SIZE], min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
         if may_touch(a, b, c, plate.half_x, plate.half_y):
             pieces.slow[slow] = k
@@ -101,7 +101,7 @@ def sum_exactly(triangles: Floats, plate: PlacedPlate, pieces: Pieces, count: in
     total, touching = 0.0, False
     for i in range(count):
         k = pieces.slow[i]
-        a, b, c = place_triangle(plate.T_plate_body, triangles, k)
+        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, k)
         write_triangle(a, b, c, triangle)
         touching = touching or contact(triangle, half_x, half_y, both) != CLEAR
         if not (plate.facing and not faces_centre(a, b, c)):
@@ -153,7 +153,7 @@ def _border_across(plate: PlacedPlate, lanes: Floats, i: int) -> int:
 def _sum_pieces(pieces: Pieces, plate: PlacedPlate, size: int, lanes: Floats) -> None:
     """Sum the pieces in the pool by point rules, cutting them as long as that pays; `made` tells who was given up."""
     # pieces are in the plate's frame, and what did not count is cut off
-    here = PlacedPlate(pieces.identity, plate.half_x, plate.half_y, True, False, (0.0, 0.0, 0.0), 0.0)
+    here = PlacedPlate(pieces.identity, plate.half_x, plate.half_y, True, False, (0.0, 0.0, 0.0), 0.0, 0.0)
     pool, in_done, rows, made = pieces.pool, pieces.in_done, pieces.rows, pieces.made
     in_done[:] = 0
     while size > 0:

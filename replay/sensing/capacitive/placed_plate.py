@@ -29,6 +29,7 @@ class PlacedPlate(NamedTuple):
         both: whether what lies behind the plate, z < 0, counts too.
         facing: whether only triangles count whose outer side the plate's centre lies on.
         centre: the plate's centre in the body's frame [m].
+        rounding: a corner no farther than this from z = 0 is on it [m]: its pose puts it no nearer.
         blur: how far off a place in `Clusters.outlines` may be, seen from the plate [m].
     """
 
@@ -38,11 +39,14 @@ class PlacedPlate(NamedTuple):
     both: bool
     facing: bool
     centre: Triple
+    rounding: float
     blur: float
 
 
 @kernel
-def placed_plate(T: Floats, half_x: float, half_y: float, both: bool, facing: bool, blur_of_body: float) -> PlacedPlate:
+def placed_plate(
+    T: Floats, half_x: float, half_y: float, both: bool, facing: bool, rounding: float, blur_of_body: float
+) -> PlacedPlate:
     """Return a plate at T_plate_body; `blur_of_body` [m] is how far off places are in the body's frame."""
     # not inlined: what returns an array has to count references
     centre = (
@@ -51,7 +55,8 @@ def placed_plate(T: Floats, half_x: float, half_y: float, both: bool, facing: bo
         -(T[0, 2] * T[0, 3] + T[1, 2] * T[1, 3] + T[2, 2] * T[2, 3]),
     )
     blur = blur_of_body + _ROUNDING * (abs(T[0, 3]) + abs(T[1, 3]) + abs(T[2, 3]))
-    return PlacedPlate(T, half_x, half_y, both, facing, centre, blur)
+    blur = max(blur, 2.0 * rounding)
+    return PlacedPlate(T, half_x, half_y, both, facing, centre, rounding, blur)
 
 
 @inlined_kernel
@@ -65,12 +70,19 @@ def place(T: Floats, x: float, y: float, z: float) -> Triple:
 
 
 @inlined_kernel
-def place_triangle(T: Floats, rows: Floats, index: int) -> tuple[Triple, Triple, Triple]:
+def place_corner(T: Floats, rounding: float, x: float, y: float, z: float) -> Triple:
+    """Return a corner in the plate's frame; one that is on z = 0 to rounding is on it."""
+    corner = place(T, x, y, z)
+    return corner[0], corner[1], corner[2] if abs(corner[2]) > rounding else 0.0
+
+
+@inlined_kernel
+def place_triangle(T: Floats, rounding: float, rows: Floats, index: int) -> tuple[Triple, Triple, Triple]:
     """Return the corners, in the plate's frame, of a triangle: the first nine numbers of a row of (n, >= 9)."""
     return (
-        place(T, rows[index, 0], rows[index, 1], rows[index, 2]),
-        place(T, rows[index, 3], rows[index, 4], rows[index, 5]),
-        place(T, rows[index, 6], rows[index, 7], rows[index, 8]),
+        place_corner(T, rounding, rows[index, 0], rows[index, 1], rows[index, 2]),
+        place_corner(T, rounding, rows[index, 3], rows[index, 4], rows[index, 5]),
+        place_corner(T, rounding, rows[index, 6], rows[index, 7], rows[index, 8]),
     )
 
 

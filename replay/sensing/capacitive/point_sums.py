@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.sensing.capacitive.clusters import CORNERS, SIZE
 from replay.sensing.capacitive.lanes import FROM, LANES, SUM, padded
-from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, place, sides_of
+from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, place_corner, sides_of
 
 Floats = NDArray[np.float64]
 
@@ -19,10 +19,10 @@ TRIANGLE_3 = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0], [2.0, 
 
 
 @inlined_kernel
-def corner_in_lanes(T: Floats, lanes: Floats, corner: int, i: int) -> Triple:
+def corner_in_lanes(T: Floats, rounding: float, lanes: Floats, corner: int, i: int) -> Triple:
     """Return a corner of the triangle in lane i, in the plate's frame."""
     at = CORNERS + 3 * corner
-    return place(T, lanes[at * LANES + i], lanes[(at + 1) * LANES + i], lanes[(at + 2) * LANES + i])
+    return place_corner(T, rounding, lanes[at * LANES + i], lanes[(at + 1) * LANES + i], lanes[(at + 2) * LANES + i])
 
 
 @leaf_kernel
@@ -34,11 +34,13 @@ def sum_by_points(
     A triangle's points (4, k), barycentric coordinates and weights, are taken in the region that the lanes say, and its
     shift [m], in the lanes, is added.
     """
-    T, half_x, half_y = plate.T_plate_body, plate.half_x, plate.half_y
+    T, half_x, half_y, rounding = plate.T_plate_body, plate.half_x, plate.half_y, plate.rounding
     for i in range(padded(count)):
         sx, sy = sides_of(lanes[region_column * LANES + i])
         keep_x, keep_y, shift_x, shift_y = abs(sx), abs(sy), sx * half_x, sy * half_y
-        a, b, c = corner_in_lanes(T, lanes, 0, i), corner_in_lanes(T, lanes, 1, i), corner_in_lanes(T, lanes, 2, i)
+        a = corner_in_lanes(T, rounding, lanes, 0, i)
+        b = corner_in_lanes(T, rounding, lanes, 1, i)
+        c = corner_in_lanes(T, rounding, lanes, 2, i)
         lanes[FROM * LANES + i] = keep_x * a[0] - shift_x
         lanes[(FROM + 1) * LANES + i] = keep_x * b[0] - shift_x
         lanes[(FROM + 2) * LANES + i] = keep_x * c[0] - shift_x

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
-from replay.kinematics.linkage import LinkPoses
+from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float
 from replay.sensing.capacitive.clusters import Clusters, make_clusters
@@ -38,6 +38,8 @@ class CapacitiveSuite:
     Plates are placed in the body's frame through the common ancestor of both links; bodies stay as they are. Frames
     whose relative pose repeats to the last bit are computed once. A body's contribution does not depend on the other
     bodies, sensors or frames. Each body is scaled by a power of two, plates with it, so that its size does not matter.
+    A corner that is in a plate's plane as far as poses are known, to 8 epsilon of the way from the plate over the links
+    to it, is in it: a face flush with a plate does not lie before it.
 
     Args:
         sensors: in the order of the columns.
@@ -106,18 +108,18 @@ class CapacitiveSuite:
         frames = len(poses.world)
         per_object = np.zeros((frames, len(self.sensors), len(self.targets)))
         touching = np.zeros((frames, len(self.sensors)), dtype=np.bool_)
-        distinct: dict[tuple[int, int], tuple[Floats, NDArray[np.intp]]] = {}
+        distinct: dict[tuple[int, int], tuple[Floats, Floats, NDArray[np.intp]]] = {}
         for s, sensor in enumerate(self.sensors):
             for t, target in enumerate(self.targets):
                 if not sensor.senses(target.link) or frames == 0:
                     continue
                 links = (sensor.link, target.link)
                 if links not in distinct:
-                    T = np.ascontiguousarray(poses.relative(*links))
-                    distinct[links] = _distinct_poses(T) if self._savings else (T, np.arange(frames))
-                T_link_body, frame_of = distinct[links]
+                    T, way = np.ascontiguousarray(poses.relative(*links)), poses.way(*links)
+                    distinct[links] = _distinct_poses(T, way) if self._savings else (T, way, np.arange(frames))
+                T_link_body, way, frame_of = distinct[links]
                 T_plate_body = transforms.compose(self._T_plate_link[s], T_link_body[:, None])
-                integral, touches = self._integrate(s, t, T_plate_body)
+                integral, touches = self._integrate(s, t, T_plate_body, way)
                 plates = len(sensor.plates)
                 self.counters.integrals += frames * plates
                 self.counters.triangles += frames * plates * len(target.triangles)
@@ -140,20 +142,28 @@ class CapacitiveSuite:
             touching=touching,
         )
 
-    def _integrate(self, sensor_index: int, target_index: int, T_plate_body: Floats) -> tuple[Floats, Flags]:
-        """Return the integrals [m] and the touching flags, (n, plates), of one body for the plates of one sensor."""
+    def _integrate(
+        self, sensor_index: int, target_index: int, T_plate_body: Floats, way: Floats
+    ) -> tuple[Floats, Flags]:
+        """Return the integrals [m] and the touching flags, (n, plates), of one body for the plates of one sensor.
+
+        `way` (n,) [m] is how long the way between their links is, see `LinkPoses.way`.
+        """
         sensor = self.sensors[sensor_index]
         both, facing = sensor.side == "both", sensor.faces == "facing"
         scale, clusters = self._scales[target_index], self._clusters[target_index]
         half_sizes, T = scale * self._half_sizes[sensor_index], T_plate_body.copy()
         T[..., :3, 3] *= scale
+        size = float(np.max(np.abs(self.targets[target_index].triangles)))
+        steps = max(float(np.abs(plate.T_link_plate[:3, 3]).sum()) for plate in sensor.plates)
+        rounding = scale * POSE_ROUNDING * (way + steps + size)
         if clusters is not None:
             counts = np.zeros(COUNTS, dtype=np.int64)
-            integral, touching, _ = sum_tree(clusters, T, half_sizes, both, facing, self.rtol, counts)
+            integral, touching, _ = sum_tree(clusters, T, rounding, half_sizes, both, facing, self.rtol, counts)
             self.counters.add(counts.tolist())
         else:
             triangles, areas = self._triangles[target_index], self._areas[target_index]
-            integral, touching = sum_triangles(triangles, areas, T, half_sizes, both, facing, self._splits)
+            integral, touching = sum_triangles(triangles, areas, T, rounding, half_sizes, both, facing, self._splits)
         return integral / scale, touching
 
 
@@ -164,12 +174,16 @@ def _power_of_two(triangles: Floats) -> float:
     return math.ldexp(1.0, max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT)))
 
 
-def _distinct_poses(T: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the poses (m, 4, 4) that occur in T (n, 4, 4), in order of appearance, and which one each frame has."""
-    seen: dict[bytes, int] = {}
-    frame_of = np.array([seen.setdefault(pose.tobytes(), len(seen)) for pose in T], dtype=np.intp)
+def _distinct_poses(T: Floats, way: Floats) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    """Return the poses (m, 4, 4) that occur in T (n, 4, 4), their ways (m,), and which one each frame has.
+
+    They come in order of appearance.
+    """
+    seen: dict[tuple[bytes, float], int] = {}
+    keys = ((pose.tobytes(), length) for pose, length in zip(T, way.tolist(), strict=True))
+    frame_of = np.array([seen.setdefault(key, len(seen)) for key in keys], dtype=np.intp)
     first = np.unique(frame_of, return_index=True)[1]
-    return np.ascontiguousarray(T[first]), frame_of
+    return np.ascontiguousarray(T[first]), way[first], frame_of
 
 
 def _sum_over_plates(integral: Floats) -> Floats:

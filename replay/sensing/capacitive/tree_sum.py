@@ -69,6 +69,7 @@ by one; triangles behind the plate or facing away, left out node by node, are th
 def sum_tree(
     clusters: Clusters,
     T_plate_body: Floats,
+    rounding: Floats,
     half_sizes: Floats,
     both: bool,
     facing: bool,
@@ -80,6 +81,7 @@ def sum_tree(
     Args:
         clusters: of the body, in its frame.
         T_plate_body: (n, p, 4, 4); half_sizes: (p, 2) [m]; both, facing: see `CapacitiveSensor`.
+        rounding: (n,) a corner no farther than this from a plate's plane is on it [m].
         rtol: largest relative error of each of the n x p integrals.
         counts: (COUNTS,) added to.
 
@@ -93,7 +95,9 @@ def sum_tree(
     for frame in range(n):
         for plate in range(plates):
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
-            here = placed_plate(T_plate_body[frame, plate], half_x, half_y, both, facing, clusters.blur)
+            here = placed_plate(
+                T_plate_body[frame, plate], half_x, half_y, both, facing, rounding[frame], clusters.blur
+            )
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _sum_one(
                 clusters, here, rtol, room, pieces, counts
             )

@@ -54,8 +54,11 @@ def judge_triangles(triangles: Floats, which: Ints, count: int, plate: PlacedPla
 def judge_loaded(count: int, plate: PlacedPlate, lanes: Floats) -> None:
     """Do what `judge_triangles` does, of rows that are in the lanes."""
     T, half_x, half_y, both, facing = plate.T_plate_body, plate.half_x, plate.half_y, plate.both, plate.facing
+    rounding = plate.rounding
     for i in range(padded(count)):
-        a, b, c = corner_in_lanes(T, lanes, 0, i), corner_in_lanes(T, lanes, 1, i), corner_in_lanes(T, lanes, 2, i)
+        a = corner_in_lanes(T, rounding, lanes, 0, i)
+        b = corner_in_lanes(T, rounding, lanes, 1, i)
+        c = corner_in_lanes(T, rounding, lanes, 2, i)
         h, spread, area = lanes[REACH * LANES + i], lanes[SPREAD * LANES + i], lanes[SIZE * LANES + i]
         first, allowed = lanes[FIRST_RULE * LANES + i], lanes[ALLOWED * LANES + i]
         low, high = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])

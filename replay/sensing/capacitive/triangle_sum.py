@@ -34,6 +34,7 @@ def sum_triangles(
     triangles: Floats,
     areas: Floats,
     T_plate_body: Floats,
+    rounding: Floats,
     half_sizes: Floats,
     both: bool,
     facing: bool,
@@ -43,7 +44,7 @@ def sum_triangles(
 
     Args:
         triangles: (k, 3, 3) [m], in the body's frame; areas: (k,) [m^2].
-        T_plate_body: (n, p, 4, 4).
+        T_plate_body: (n, p, 4, 4); rounding: (n,) a corner no farther than this from a plate's plane is on it [m].
         half_sizes: (p, 2) [m].
         both, facing: what counts, see `CapacitiveSensor`.
         splits: of the midpoint rule, or EXACT.
@@ -61,7 +62,7 @@ def sum_triangles(
             T = T_plate_body[frame, plate]
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
-                a, b, c = place_triangle(T, rows, k)
+                a, b, c = place_triangle(T, rounding[frame], rows, k)
                 write_triangle(a, b, c, corners)
                 if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InvalidValue
+from replay.kinematics.linkage import POSE_ROUNDING
 from replay.numerics.arguments import as_float, as_floats
-from replay.sensing.distance.cone import ROUNDING, Cone, half_angle
+from replay.sensing.distance.cone import Cone, half_angle
 from replay.sensing.distance.query import closest_of_all
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ def closest_in_cone(
         raise InvalidValue("triangles", "coordinates", "must be small enough that differences to the apex are finite")
     exponent = math.frexp(largest)[1]
     relative = np.ldexp(relative, -exponent)
-    rounding = ROUNDING * max(float(np.max(np.abs(corners), initial=0.0)), float(np.max(np.abs(origin))))
+    rounding = POSE_ROUNDING * max(float(np.max(np.abs(corners), initial=0.0)), float(np.max(np.abs(origin))))
     cone = Cone(*direction, *half_angle(aperture), math.ldexp(rounding, -exponent))
     distance, point, triangle, case = closest_of_all(relative, (0.0, 0.0, 0.0), cone, _scaled_range(range, exponent))
     if triangle < 0:

@@ -24,12 +24,6 @@ Corners are rounded in a frame where they are larger than seen from the apex (5 
 this covers triangles a hundred times smaller than their distance to the origin they were rounded at.
 """
 
-ROUNDING = 8.0 * EPSILON
-"""Rounding of the apex's place, as part of the lengths it was computed from.
-
-Poses chained over up to eight links, turned every way, were off by at most one epsilon of the sum of the links' steps.
-"""
-
 _DIRECTION = 4.0 * EPSILON
 """Rounding of a direction [rad] in the membership test."""
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from replay.errors import InvalidValue
 from replay.geometry.tree import triangle_tree
 from replay.geometry.wide_tree import widen
-from replay.kinematics.linkage import LinkPoses
+from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.sensing.columns import DistanceColumns
 from replay.sensing.distance.closest import check_aperture, check_range
-from replay.sensing.distance.cone import ROUNDING, half_angle
+from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.counters import DistanceCounters
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact, sweep_scan
@@ -142,7 +142,7 @@ class DistanceSuite:
                     relative[links] = poses.relative(*links)
                     way[links] = poses.way(*links)
                 T_target_sensor[index] = transforms.compose(relative[links], sensor.T_link_sensor)
-                rounding = ROUNDING * (way[links] + self._sizes[index] + np.abs(sensor.T_link_sensor[:3, 3]).sum())
+                rounding = POSE_ROUNDING * (way[links] + self._sizes[index] + np.abs(sensor.T_link_sensor[:3, 3]).sum())
                 self.counters.readings += frames
                 self.counters.triangles += frames * len(target.triangles)
                 if self._savings:

@@ -14,7 +14,7 @@ axis is never intersected with the plane, and one sign decides between foot and 
 
 Slivers need no case of their own: their normal is formed in twice the working precision; those no wider than rounding
 are their edges. A distance below what rounding
-the corners' coordinates (`TOUCH`) or the apex (`ROUNDING`) can do to it is none: the apex is on the triangle.
+the corners' coordinates (`TOUCH`) or of the apex can do to it is none: the apex is on the triangle.
 Source: J. Huijgens, TU Eindhoven 2015, for the cases; the forms used are derived here.
 """
 
