@@ -13,7 +13,7 @@ from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.mesh_file import read_faces
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
-from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
+from replay.geometry.winding import corner_indices, repeated, topology, wound_against_neighbours
 from replay.numerics.jit import kernel
 
 Array = NDArray[np.float64]
@@ -76,14 +76,20 @@ def solid_from_triangles(triangles: Array) -> Solid:
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3) or not np.isfinite(triangles).all():
         raise InvalidValue("triangles", triangles.shape, "must have shape (n, 3, 3) and be finite")
     flat = ~_have_area(triangles)
-    dropped = int(np.count_nonzero(flat))
-    if dropped == len(triangles):
-        raise InvalidValue("triangles", len(triangles), f"none of its {dropped} triangles has an area")
+    without_area = int(np.count_nonzero(flat))
+    if without_area == len(triangles):
+        raise InvalidValue("triangles", len(triangles), f"none of its {without_area} triangles has an area")
     notes = []
-    if dropped:
-        notes.append(f"{dropped} of {len(triangles)} triangles have no area and were dropped")
+    if without_area:
+        notes.append(f"{without_area} of {len(triangles)} triangles have no area and were dropped")
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
     faces = corner_indices(triangles)
+    again = repeated(faces) & ~flat
+    repeats = int(np.count_nonzero(again))
+    if repeats:
+        notes.append(f"{repeats} of {len(triangles)} triangles repeat another one and were dropped")
+        triangles, faces, flat = triangles[~again], faces[~again], flat[~again]
+    dropped = without_area + repeats
     joints = topology(faces)
     if joints.open_edges == 0 and joints.reversed_edges:
         turned = wound_against_neighbours(faces)

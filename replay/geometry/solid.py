@@ -22,7 +22,7 @@ class Solid:
             one that is to be collided by its triangles.
         watertight: whether the triangles close a volume.
         chord_error: largest distance [m] of the triangles from the curved surface they stand for; 0 for flat faces.
-        dropped: degenerate triangles dropped on import.
+        dropped: degenerate and repeated triangles dropped on import.
         notes: what a reader of the scenario should know about an imported mesh, one sentence each.
     """
 

@@ -34,6 +34,15 @@ def corner_indices(triangles: Array) -> Indices:
     return corners.reshape(-1, 3).astype(np.int64)
 
 
+def repeated(faces: Indices) -> NDArray[np.bool_]:
+    """Return which faces (n,) have the corners of an earlier one in the same sense."""
+    turn = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
+    first = np.unique(np.take_along_axis(faces, turn, axis=1), axis=0, return_index=True)[1]
+    result = np.ones(len(faces), dtype=np.bool_)
+    result[first] = False
+    return result
+
+
 def topology(faces: Indices) -> Topology:
     """Return the topology of a surface of faces (n, 3), corner indices."""
     _, forward, edge = _edges(faces)

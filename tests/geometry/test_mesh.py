@@ -88,6 +88,18 @@ def test_repairs_are_noted() -> None:
     assert solid_from_triangles(np.concatenate([cube.triangles, line])).dropped == 1
 
 
+def test_repeated_triangles_count_once() -> None:
+    # one repeat left a box without an inside, and each one was summed twice by plates
+    cube = primitives.cube(1.0).triangles
+    for more in (cube[3:4], cube[[0, 5, 5]], cube[:, [1, 2, 0]]):
+        solid = solid_from_triangles(np.concatenate([cube, more]))
+        np.testing.assert_array_equal(solid.triangles, cube)
+        assert solid.watertight and solid.is_convex and solid.dropped == len(more)
+        assert solid.notes == (f"{len(more)} of {12 + len(more)} triangles repeat another one and were dropped",)
+    sheet = np.concatenate([cube[:2], cube[:2, ::-1]])  # the two sides of a sheet repeat nothing
+    assert len(solid_from_triangles(sheet).triangles) == 4
+
+
 def test_winding_is_repaired() -> None:
     rng = np.random.default_rng(2)
     ring = primitives.arc(0.8, 2 * np.pi, 0.2, 0.1, 1e-3)
