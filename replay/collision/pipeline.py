@@ -130,7 +130,9 @@ class CollisionPipeline:
             InvalidValue: a pose is not finite, or the pairs were given as rules: they have no columns.
 
         Accuracy: a clearance is right to 1e-12 of itself plus 1e-14 of the bodies' reach and offset
-        (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does.
+        (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does, for the poses as they are
+        computed: bodies that are written to touch may be 1e-16 of the way between them apart, and read that clearance,
+        not contact.
         """
         if isinstance(self._pairs, Ruled):
             raise InvalidValue("pairs", "rules", "columns need listed pairs; ask `contacts` instead")

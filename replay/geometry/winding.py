@@ -39,7 +39,7 @@ def corner_indices(triangles: Array) -> Indices:
 def repeated(faces: Indices) -> NDArray[np.bool_]:
     """Return which faces (n,) have the corners of an earlier one in the same sense."""
     turn = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
-    first = np.unique(np.take_along_axis(faces, turn, axis=1), axis=0, return_index=True)[1]
+    first = distinct_rows(np.take_along_axis(faces, turn, axis=1)).first
     result = np.ones(len(faces), dtype=np.bool_)
     result[first] = False
     return result

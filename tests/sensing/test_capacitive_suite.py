@@ -147,6 +147,29 @@ def test_a_face_flush_with_the_plate_up_to_rounding_is_in_its_plane_whatever_car
     np.testing.assert_allclose(readings, readings[0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("method", ["tree", "exact"])
+def test_a_face_whose_plane_holds_the_plate_centre_up_to_rounding_does_not_face_it(method):
+    rng = np.random.default_rng(8)
+    block = cuboid((0.2, 0.4, 0.3)).triangles
+    readings = []
+    for steps in rng.uniform(-2.0, 2.0, (12, 3, 3)).round(2):
+        edge_on = transforms.from_translation(
+            steps[0] + steps[1] + [0.1, 0.4, -0.05] - steps[2]
+        )  # in the plane of the side +x
+        linkage = Linkage(
+            [
+                Link("arm", None, transforms.from_translation(steps[0]), Joint("arm")),
+                Link("block", "arm", transforms.from_translation(steps[1]), Joint("block")),
+                Link("stand", None, transforms.from_translation(steps[2]), Joint("stand")),
+            ]
+        )
+        plates = (Plate("p", edge_on, np.array([0.1, 0.15])),)
+        sensor = CapacitiveSensor("s", 2, plates, coupling=10e-12, side="both", faces="facing")
+        suite = CapacitiveSuite([sensor], [make_target("block/skin", 1, block)], method=method)
+        readings.append(suite.run(linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4)))).capacitance[0, 0])
+    np.testing.assert_allclose(readings, readings[0], rtol=1e-6)
+
+
 def test_a_machine_far_from_the_origin_reads_the_same():
     linkage, targets, sensor = _scene()
     deaf = CapacitiveSensor(

@@ -74,7 +74,11 @@ def sum_hard(
         if may_touch(a, b, c, plate.half_x, plate.half_y):
             pieces.slow[slow] = k
             slow += 1
-        elif (plate.both or high > 0.0) and area > 0.0 and not (plate.facing and not faces_centre(a, b, c)):
+        elif (
+            (plate.both or high > 0.0)
+            and area > 0.0
+            and not (plate.facing and not faces_centre(a, b, c, plate.rounding))
+        ):
             pieces.triangles[owners], pieces.densities[owners] = k, share / area
             pieces.totals[owners], pieces.errors[owners], pieces.made[owners] = 0.0, 0.0, 1
             write_piece(pool, size, a, b, c, area, float(owners))
@@ -104,7 +108,7 @@ def sum_exactly(triangles: Floats, plate: PlacedPlate, pieces: Pieces, count: in
         a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, k)
         write_triangle(a, b, c, triangle)
         touching = touching or contact(triangle, half_x, half_y, both) != CLEAR
-        if not (plate.facing and not faces_centre(a, b, c)):
+        if not (plate.facing and not faces_centre(a, b, c, plate.rounding)):
             total += integral_over_triangle(triangle, triangles[k, SIZE], half_x, half_y, both, pieces.scratch)
     return total, touching
 

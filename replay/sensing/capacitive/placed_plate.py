@@ -29,7 +29,7 @@ class PlacedPlate(NamedTuple):
         both: whether what lies behind the plate, z < 0, counts too.
         facing: whether only triangles count whose outer side the plate's centre lies on.
         centre: the plate's centre in the body's frame [m].
-        rounding: a corner no farther than this from z = 0 is on it [m]: its pose puts it no nearer.
+        rounding: of places [m]: a corner no farther than this from z = 0 is on it, a plane from the centre, through it.
         blur: how far off a place in `Clusters.outlines` may be, seen from the plate [m].
     """
 
@@ -94,11 +94,15 @@ def write_triangle(a: Triple, b: Triple, c: Triple, triangle: Floats) -> None:
 
 
 @inlined_kernel
-def faces_centre(a: Triple, b: Triple, c: Triple) -> bool:
-    """Return whether the outer side of a triangle in the plate's frame holds the plate's centre, n.(0 - a) > 0."""
+def faces_centre(a: Triple, b: Triple, c: Triple, rounding: float) -> bool:
+    """Return whether the outer side of a triangle in the plate's frame holds the plate's centre, n.(0 - a) > 0.
+
+    A centre no farther from the triangle's plane than `rounding` [m] is in it.
+    """
     bx, by, bz, cx, cy, cz = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    outward = (by * cz - bz * cy) * a[0] + (bz * cx - bx * cz) * a[1] + (bx * cy - by * cx) * a[2]
-    return outward < 0.0
+    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    outward = nx * a[0] + ny * a[1] + nz * a[2]
+    return outward < 0.0 and outward * outward > rounding * rounding * (nx * nx + ny * ny + nz * nz)
 
 
 @inlined_kernel

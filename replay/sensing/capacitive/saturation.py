@@ -44,7 +44,7 @@ def suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -
             continue
         for k in range(links[index, BEGIN], links[index, END]):
             a, b, c = place_triangle(T, plate.rounding, triangles, k)
-            counts = triangles[k, SIZE] > 0.0 and (not plate.facing or faces_centre(a, b, c))
+            counts = triangles[k, SIZE] > 0.0 and (not plate.facing or faces_centre(a, b, c, plate.rounding))
             if counts and may_touch(a, b, c, half_x, half_y):
                 found[count] = k
                 count += 1

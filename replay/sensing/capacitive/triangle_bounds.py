@@ -80,7 +80,7 @@ def judge_loaded(count: int, plate: PlacedPlate, lanes: Floats) -> None:
         kept = 1.0 if rule != NO_RULE and r > CLOSEST * h else 0.0
         kept = (1.0 if far_enough else 0.0) if crossing else kept
         # one that does not face the plate may still touch it
-        averted = facing and r > CLOSEST * h and not faces_centre(a, b, c)
+        averted = facing and r > CLOSEST * h and not faces_centre(a, b, c, rounding)
         kept = -1.0 if averted or (not both and high < 0.0) else kept
         lanes[(FOUND + REGION) * LANES + i] = region_of(x, y, half_x, half_y)
         lanes[(FOUND + ERROR) * LANES + i] = wrong if crossing else error

@@ -66,7 +66,7 @@ def sum_triangles(
                 write_triangle(a, b, c, corners)
                 if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True
-                if facing and not faces_centre(a, b, c):
+                if facing and not faces_centre(a, b, c, rounding[frame]):
                     continue
                 if splits == EXACT:
                     value = integral_over_triangle(corners, areas[k], half_x, half_y, both, scratch)
