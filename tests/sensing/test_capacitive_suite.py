@@ -170,6 +170,26 @@ def test_a_face_whose_plane_holds_the_plate_centre_up_to_rounding_does_not_face_
     np.testing.assert_allclose(readings, readings[0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("method", ["tree", "exact"])
+def test_a_wall_that_a_plate_abuts_on_up_to_rounding_saturates_it(method):
+    # the wall stood a last digit inside the plate, on its edge, or beyond it: then the reading was finite
+    rng = np.random.default_rng(9)
+    wall = cuboid((0.2, 0.8, 0.6)).triangles
+    for steps in rng.uniform(-2.0, 2.0, (12, 3, 3)).round(2):
+        beside = transforms.from_translation(steps[0] + steps[1] + [-0.3, 0.05, 0.1] - steps[2])
+        linkage = Linkage(
+            [
+                Link("arm", None, transforms.from_translation(steps[0]), Joint("arm")),
+                Link("stand", None, transforms.from_translation(steps[2]), Joint("stand")),
+                Link("wall", "arm", transforms.from_translation(steps[1]), Joint("wall")),
+            ]
+        )
+        sensor = CapacitiveSensor("s", 1, (Plate("p", beside, np.array([0.2, 0.1])),), coupling=10e-12)
+        suite = CapacitiveSuite([sensor], [make_target("wall/skin", 2, wall)], method=method)
+        columns = suite.run(linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4))))
+        assert columns.saturated.all() and columns.touching.all()
+
+
 def test_a_machine_far_from_the_origin_reads_the_same():
     linkage, targets, sensor = _scene()
     deaf = CapacitiveSensor(

@@ -69,7 +69,7 @@ def sum_hard(
     slow, size, owners = 0, 0, 0
     for at in range(begin, begin + count):
         k = hard[at]
-        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, k)
+        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, (plate.half_x, plate.half_y), triangles, k)
         area, low, high = triangles[k, SIZE], min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
         if may_touch(a, b, c, plate.half_x, plate.half_y):
             pieces.slow[slow] = k
@@ -105,7 +105,7 @@ def sum_exactly(triangles: Floats, plate: PlacedPlate, pieces: Pieces, count: in
     total, touching = 0.0, False
     for i in range(count):
         k = pieces.slow[i]
-        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, k)
+        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, (plate.half_x, plate.half_y), triangles, k)
         write_triangle(a, b, c, triangle)
         touching = touching or contact(triangle, half_x, half_y, both) != CLEAR
         if not (plate.facing and not faces_centre(a, b, c, plate.rounding)):

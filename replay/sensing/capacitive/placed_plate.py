@@ -6,6 +6,7 @@ v beyond the borders, 0 between them, and z.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,8 @@ class PlacedPlate(NamedTuple):
         both: whether what lies behind the plate, z < 0, counts too.
         facing: whether only triangles count whose outer side the plate's centre lies on.
         centre: the plate's centre in the body's frame [m].
-        rounding: of places [m]: a corner no farther than this from z = 0 is on it, a plane from the centre, through it.
+        rounding: of places [m]: a corner no farther than this from z = 0 or from a border's plane is in it, a plane no
+            farther from the centre goes through it.
         blur: how far off a place in `Clusters.outlines` may be, seen from the plate [m].
     """
 
@@ -77,12 +79,30 @@ def place_corner(T: Floats, rounding: float, x: float, y: float, z: float) -> Tr
 
 
 @inlined_kernel
-def place_triangle(T: Floats, rounding: float, rows: Floats, index: int) -> tuple[Triple, Triple, Triple]:
-    """Return the corners, in the plate's frame, of a triangle: the first nine numbers of a row of (n, >= 9)."""
+def _on_border(x: float, half: float, rounding: float) -> float:
+    """Return x, or the border that it is on to rounding."""
+    return x if abs(abs(x) - half) > rounding else math.copysign(half, x)
+
+
+@inlined_kernel
+def _place_exactly(T: Floats, rounding: float, halves: tuple[float, float], x: float, y: float, z: float) -> Triple:
+    """Return a corner in the plate's frame; one that is on z = 0 or in a border's plane to rounding is in it."""
+    corner = place_corner(T, rounding, x, y, z)
+    return _on_border(corner[0], halves[0], rounding), _on_border(corner[1], halves[1], rounding), corner[2]
+
+
+@inlined_kernel
+def place_triangle(
+    T: Floats, rounding: float, halves: tuple[float, float], rows: Floats, index: int
+) -> tuple[Triple, Triple, Triple]:
+    """Return the corners, in the plate's frame, of a triangle: the first nine numbers of a row of (n, >= 9).
+
+    Corners in the planes of the plate, `halves` its half sizes, and of its borders are in them exactly.
+    """
     return (
-        place_corner(T, rounding, rows[index, 0], rows[index, 1], rows[index, 2]),
-        place_corner(T, rounding, rows[index, 3], rows[index, 4], rows[index, 5]),
-        place_corner(T, rounding, rows[index, 6], rows[index, 7], rows[index, 8]),
+        _place_exactly(T, rounding, halves, rows[index, 0], rows[index, 1], rows[index, 2]),
+        _place_exactly(T, rounding, halves, rows[index, 3], rows[index, 4], rows[index, 5]),
+        _place_exactly(T, rounding, halves, rows[index, 6], rows[index, 7], rows[index, 8]),
     )
 
 

@@ -36,14 +36,14 @@ def suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -
         index = stack[size]
         x, y, z = place(T, nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2])
         u, v = beyond_borders(x, y, half_x, half_y)
-        if math.sqrt(u * u + v * v + z * z) > 1.000001 * nodes[index, RADIUS] + plate.rounding:
+        if math.sqrt(u * u + v * v + z * z) > 1.000001 * nodes[index, RADIUS] + 2.0 * plate.rounding:
             continue
         if links[index, SECOND_CHILD] >= 0:
             stack[size], stack[size + 1] = links[index, SECOND_CHILD], index + 1
             size += 2
             continue
         for k in range(links[index, BEGIN], links[index, END]):
-            a, b, c = place_triangle(T, plate.rounding, triangles, k)
+            a, b, c = place_triangle(T, plate.rounding, (half_x, half_y), triangles, k)
             counts = triangles[k, SIZE] > 0.0 and (not plate.facing or faces_centre(a, b, c, plate.rounding))
             if counts and may_touch(a, b, c, half_x, half_y):
                 found[count] = k
@@ -70,7 +70,7 @@ def any_saturates(triangles: Floats, which: Ints, count: int, plate: PlacedPlate
     `triangle` (3, 3) is scratch memory.
     """
     for i in range(count):
-        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, triangles, which[i])
+        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, (plate.half_x, plate.half_y), triangles, which[i])
         write_triangle(a, b, c, triangle)
         if contact(triangle, plate.half_x, plate.half_y, plate.both) == SATURATED:
             return True

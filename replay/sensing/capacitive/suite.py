@@ -38,9 +38,9 @@ class CapacitiveSuite:
     Plates are placed in the body's frame through the common ancestor of both links; bodies stay as they are. Frames
     whose relative pose repeats to the last bit are computed once. A body's contribution does not depend on the other
     bodies, sensors or frames. Each body is scaled by a power of two, plates with it, so that its size does not matter.
-    A corner that is in a plate's plane as far as poses are known, to 8 epsilon of the way from the plate over the links
-    to it, is in it: a face flush with a plate does not lie before it. As far as that, a face whose plane holds the
-    centre of a plate does not face it.
+    A corner that is in the plane of a plate or of one of its borders as far as poses are known, to 8 epsilon of the way
+    from the plate over the links to it, is in it: a face flush with a plate does not lie before it, and a wall that a
+    plate abuts on saturates it. As far as that, a face whose plane holds the centre of a plate does not face it.
 
     Args:
         sensors: in the order of the columns.

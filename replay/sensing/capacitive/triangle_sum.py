@@ -62,7 +62,7 @@ def sum_triangles(
             T = T_plate_body[frame, plate]
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
-                a, b, c = place_triangle(T, rounding[frame], rows, k)
+                a, b, c = place_triangle(T, rounding[frame], (half_x, half_y), rows, k)
                 write_triangle(a, b, c, corners)
                 if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True
