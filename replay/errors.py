@@ -36,10 +36,10 @@ class Problem:
 
 
 class ScenarioError(ReplayError):
-    """A scenario (or a file it includes) is not valid; every problem found is listed, one line each."""
+    """A scenario (or a file it includes) is not valid; every problem found is listed once, one line each."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
-        self.problems = tuple(problems)
+        self.problems = tuple({str(problem): problem for problem in problems}.values())
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 

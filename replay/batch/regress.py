@@ -102,7 +102,7 @@ def regress(
     ]
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
-    unused = sorted(set(accepted.names()) - {item.name for item in ended})
+    unused = sorted(set(accepted.names()) - {item.name for item in ended}) if selection.of_folders else []
     return Regression(run, baseline, rules_file, model_name, tuple(ended), tuple(unused))
 
 

@@ -104,11 +104,13 @@ class Selection:
         chosen: the scenarios to run.
         skipped: those that were filtered out, by name, with the reason.
         sources: the file that each comes from, as the user named it.
+        of_folders: whether a folder was named: then these are all scenarios that there are.
     """
 
     chosen: tuple[Scenario, ...]
     skipped: Mapping[str, str]
     sources: Mapping[str, Path]
+    of_folders: bool
 
     @staticmethod
     def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
@@ -120,7 +122,8 @@ class Selection:
         names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
         skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
         skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
-        return Selection(tuple(chosen), skipped, {scenario.name: path for scenario, path in loaded})
+        sources = {scenario.name: path for scenario, path in loaded}
+        return Selection(tuple(chosen), skipped, sources, any(Path(path).is_dir() for path in paths))
 
 
 def _matches(scenario: Scenario, pattern: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from replay.comparison import wording
-from replay.comparison.difference import Change, Difference, SignalDifference
+from replay.comparison.difference import Change, Difference, SignalDifference, Verdict
 from replay.comparison.runs import Case, RunDifference
 
 SHOWN_SIGNALS = 12
@@ -18,19 +18,18 @@ def text(found: RunDifference, *, verbose: bool = False) -> str:
 
 
 def _lines(found: RunDifference, verbose: bool) -> Iterator[str]:
-    several = len(found.cases) + len(found.missing) + len(found.extra) > 1
+    alone = [*found.missing, *found.extra]
+    several = len(found.cases) + len(found.unreadable) + len(alone) > 1
     above: tuple[Change, ...] = ()
     for case in found.cases:
         yield from _case(case, verbose, above)
         above = case.difference.provenance or above
+    yield from (f"{Verdict.UNREADABLE.value}: {one.name}: {one.error}" for one in found.unreadable)
     for where, names in (("missing in the candidate", found.missing), ("only in the candidate", found.extra)):
         for name in names:
             yield f"scenario {name}: {where}{' [ignored]' if name in found.ignored else ''}"
     if several:
-        yield (
-            f"{found.verdict.value}: {len(found.different)} of {len(found.cases)} scenarios differ, "
-            f"{len(found.missing)} missing, {len(found.extra)} extra"
-        )
+        yield f"{found.verdict.value}: {wording.totals(found)}"
 
 
 def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]:

@@ -39,6 +39,7 @@ def suggest(found: RunDifference) -> str:
             rules.setdefault(tuple(_tolerance(items)), []).append(name)
     for case in found.cases:
         hopeless.extend(f"{case.name}: {line}" for line in _structure(case.difference))
+    hopeless.extend(f"scenario {one.name}: {one.error}" for one in found.unreadable)
     alone = [name for name in (*found.missing, *found.extra) if name not in found.ignored]
     hopeless.extend(f"scenario {name}: in one run only" for name in alone)
     return "\n".join([*_head(found), *_rules(rules), *_comments(hopeless)]) + "\n"

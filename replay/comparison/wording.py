@@ -17,6 +17,7 @@ from replay.comparison.difference import (
     Worst,
 )
 from replay.comparison.rules import EXACT, Rule
+from replay.comparison.runs import RunDifference
 from replay.comparison.signals import ROTATION_FIELD
 
 SHOWN_EVENTS = 5
@@ -165,6 +166,13 @@ def expired(item: Rule) -> str:
     """Return that a rule no longer applies."""
     assert item.expires is not None
     return f"expired on {item.expires.isoformat()}, no longer applies: {', '.join(item.signals)}: {item.reason.strip()}"
+
+
+def totals(found: RunDifference) -> str:
+    """Return "1 of 3 scenarios differ, 0 missing, 0 extra", and how many are unreadable if any."""
+    unreadable = f", {len(found.unreadable)} unreadable" if found.unreadable else ""
+    differ = f"{len(found.different)} of {count(len(found.cases), 'scenario')} differ"
+    return f"{differ}, {len(found.missing)} missing, {len(found.extra)} extra{unreadable}"
 
 
 def summary(found: Difference) -> str:

@@ -98,6 +98,8 @@ def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
     mesh.write_bytes(b"x")
     with pytest.raises(RecordingError, match="SHA-256 is not its name"):
         attached_files(baseline.recording("a"))
+    baseline.store(entries(run, "a"), reason="again", now=NOW)
+    assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
     mesh.unlink()
     with pytest.raises(RecordingError, match="neither attached nor in a folder 'objects'"):
         attached_files(baseline.recording("a"))

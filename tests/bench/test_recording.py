@@ -61,7 +61,9 @@ def test_what_a_frame_more_costs_is_told_apart_from_what_a_recording_costs(monke
         "recording.short": (230.0, "missed"),  # of e
     }
     (note,) = report.notes
-    assert re.fullmatch(r"Nobody can record fewer than \d+ frames within 100 us a frame: files .* take [\d.]+ ms\.", note)
+    assert re.fullmatch(
+        r"Nobody can record fewer than \d+ frames within 100 us a frame: files .* take [\d.]+ ms\.", note
+    )
     monkeypatch.setattr(recording, "on", made_up(frames, 0.0, 101e-6))
     report = recording.run(scenes=("b",), rounds=1)
     assert report.grids[recording.COSTS].lines[0]["frames from which it is met"] == "never"

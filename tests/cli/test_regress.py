@@ -127,6 +127,28 @@ def test_filters_missing_and_unused_baselines(tmp_path, capsys):
     assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
 
 
+def test_one_file_is_compared_with_its_own_baseline_alone(tmp_path, capsys):
+    prepare(tmp_path, plain=2, bad=0, differing=0)
+    capsys.readouterr()
+    base = ["--baseline", str(tmp_path / "base"), "-o", str(tmp_path / "out")]
+    assert run(["regress", str(tmp_path / "in" / "plain_0.yaml"), *base]) is ExitCode.FINE
+    assert "unused" not in capsys.readouterr().out
+
+
+def test_a_damaged_baseline_is_replaced_by_accepting(tmp_path, capsys):
+    prepare(tmp_path, plain=3, bad=0, differing=0)
+    for name in ("plain_0", "plain_1"):
+        damaged = tmp_path / "base" / name / f"{name}.mcap"
+        damaged.write_bytes(damaged.read_bytes()[:-100])
+    out = tmp_path / "out"
+    assert night(tmp_path, out, "--select", "plain_[02]") is ExitCode.INVALID
+    assert verdicts_of(out) == {"plain_0": "unreadable baseline", "plain_1": "skipped", "plain_2": "same"}
+    capsys.readouterr()
+    assert run(["accept", str(out), "--baseline", str(tmp_path / "base"), "--yes", "--reason", "mended"]) == 0
+    assert "plain_0: replaces a baseline that cannot be read: damaged: its end" in capsys.readouterr().out
+    assert night(tmp_path, out, "--select", "plain_[02]") is ExitCode.FINE
+
+
 def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     scenes.write(tmp_path / "in", "a")
     scenes.write(tmp_path / "in", "b")
