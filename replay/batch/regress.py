@@ -19,6 +19,7 @@ from replay.batch.select import Selection
 from replay.batch.watch import Unwatched, Watch
 from replay.comparison import wording
 from replay.comparison.difference import Verdict as DiffVerdict
+from replay.comparison.log_changes import same_messages
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.rules import Rules
@@ -103,7 +104,20 @@ def regress(
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
     unused = sorted(set(accepted.names()) - {item.name for item in ended}) if selection.of_folders else []
+    ended = [_renamed(item, accepted, unused) for item in ended]
     return Regression(run, baseline, rules_file, model_name, tuple(ended), tuple(unused))
+
+
+def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
+    """Say of a scenario without a baseline which unused one is byte by byte the same: it may have been renamed."""
+    if item.verdict is not Verdict.MISSING:
+        return item
+    for name in unused:
+        with contextlib.suppress(RecordingError):
+            if same_messages(accepted.directory / name / f"{name}.mcap", _mcap(item)):
+                message = f"{item.message}; the unused baseline {name} has exactly the same readings: renamed?"
+                return dataclasses.replace(item, message=message)
+    return item
 
 
 def _forget(directory: Path, names: Sequence[str]) -> None:

@@ -69,7 +69,7 @@ def describe(found: Regression) -> list[str]:
     lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
     if found.unused:
         number = wording.count(len(found.unused), "unused baseline")
-        lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}")
+        lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}; delete the folder of what is gone")
     lines += ["interrupted: the reports are partial"] if found.run.interrupted else []
     counts = {verdict: found.count(verdict) for verdict in dict.fromkeys(item.verdict for item in found.judged)}
     parts = [f"{number} {verdict.value}" for verdict, number in counts.items()]

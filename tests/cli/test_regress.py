@@ -127,6 +127,19 @@ def test_filters_missing_and_unused_baselines(tmp_path, capsys):
     assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
 
 
+def test_a_renamed_scenario_is_told_by_its_readings(tmp_path, capsys):
+    prepare(tmp_path, plain=2, bad=0, differing=0)
+    (tmp_path / "in" / "plain_1.yaml").unlink()
+    scenes.write(tmp_path / "in", "new_name")
+    scenes.write(tmp_path / "in", "another", distance=1.25)
+    capsys.readouterr()
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert "new_name: missing baseline" in said and "unused baseline plain_1 has exactly the same" in said
+    assert said.count("renamed?") == 1
+    assert "1 unused baseline, of no scenario given: plain_1; delete the folder of what is gone" in said
+
+
 def test_one_file_is_compared_with_its_own_baseline_alone(tmp_path, capsys):
     prepare(tmp_path, plain=2, bad=0, differing=0)
     capsys.readouterr()
