@@ -90,9 +90,10 @@ class RecordingError(ReplayError):
 class RecordingExistsError(ReplayError):
     """The target of a run exists already and overwriting was not asked for."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, *, resumable: bool = False) -> None:
         self.file = file
-        super().__init__(f"{file}: exists already; pass --overwrite to replace it, or -o DIR to write elsewhere")
+        resume = " --resume to keep what is up to date," if resumable else ""
+        super().__init__(f"{file}: exists already; pass --overwrite to replace it,{resume} or -o DIR to write elsewhere")
 
 
 class WriteError(ReplayError):

@@ -91,10 +91,11 @@ class Baseline:
 
     def _undo(self, new: bool) -> None:
         """Remove the meshes of recordings that were not stored, and the folders that are empty without them."""
+        self._remove_unneeded()
         with contextlib.suppress(OSError):
-            self._remove_unneeded()
             (self.directory / OBJECTS).rmdir()
-            if new:
+        if new:
+            with contextlib.suppress(OSError):
                 self.directory.rmdir()
 
     def _remove_unneeded(self) -> None:

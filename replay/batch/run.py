@@ -126,7 +126,7 @@ def run_all(
         for scenario in scenarios:
             for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
                 if recording.exists():
-                    raise RecordingExistsError(str(recording))
+                    raise RecordingExistsError(str(recording), resumable=True)
     left = [scenario for scenario in scenarios if scenario.name not in results]
     costs = {scenario.name: expected_cost(scenario) for scenario in left}
     workers = min(execution.workers or os.cpu_count() or 1, max(len(left), 1))

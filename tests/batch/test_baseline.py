@@ -89,6 +89,9 @@ def test_nothing_changes_when_one_of_them_cannot_be_stored(run, tmp_path):
             {**entries(run, "a"), "b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW
         )
     assert not (tmp_path / "new").exists()
+    with pytest.raises(RecordingError):  # no mesh was written by then
+        Baseline(tmp_path / "new").store({"b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW)
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):

@@ -66,7 +66,8 @@ def test_run_leaves_the_run_folder_of_the_design(recorded):
 def test_recordings_are_not_overwritten_unless_asked(scenario, recorded, capsys):
     before = (recorded / "swing.mcap").read_bytes()
     assert run(["run", str(scenario), "-o", str(recorded.parent)]) is ExitCode.INVALID
-    assert "exists already; pass --overwrite" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "exists already; pass --overwrite to replace it, --resume to keep what is up to date, or -o DIR" in said
     assert run(["run", str(scenario), "-o", str(recorded.parent), "--overwrite"]) is ExitCode.FINE
     assert (recorded / "swing.mcap").read_bytes() == before  # the same inputs give the same bytes
 
