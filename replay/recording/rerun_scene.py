@@ -77,11 +77,11 @@ def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:
 
 
 def extent(scene: SceneView, link_poses: Floats) -> Floats:
-    """Return points (n, 3) [m] in world coordinates that span the scene.
+    """Return points (n, 3) [m] in world coordinates that span the scene and where it moves.
 
     Args:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
-        link_poses: (L, 4, 4), T_world_link in one frame.
+        link_poses: (F, L, 4, 4), T_world_link in some frames.
     """
     spans = [(cone.link, cone.T_link_sensor[:3, 3][None]) for cone in scene.cones]
     spans += [(plate.link, plate_corners(plate)) for plate in scene.plates]
@@ -96,7 +96,8 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         spans += [(bodies[k].link, boxes[k]) for k in np.flatnonzero(solid if solid.any() else ~solid).tolist()]
     if not spans:
         return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
-    return np.concatenate([transforms.apply(link_poses[link], points) for link, points in spans])
+    links = np.repeat([link for link, _ in spans], [len(points) for _, points in spans])
+    return transforms.apply(link_poses[:, links], np.concatenate([points for _, points in spans])).reshape(-1, 3)
 
 
 def _mesh(corners: Floats, normals: Floats, color: Color | None) -> list[Column]:

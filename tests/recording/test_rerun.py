@@ -150,13 +150,13 @@ def test_normals_are_those_of_every_corner_against_every_other() -> None:
 
 def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     scene = moving.scene()
-    poses = next(moving.blocks(FRAMES)).link_poses[40]
+    poses = next(moving.blocks(FRAMES)).link_poses[[0, 40, 80]]
     sheet = np.array([[[-9.0, -9, 0], [9, -9, 0], [9, 9, 0]]])
     floor = BodyView("room/floor", 1, sheet, (0, 0, 0, 255))
     nothing = BodyView("room/nothing", 1, np.zeros((0, 3, 3)), (0, 0, 0, 255))
-    placed = [transforms.apply(poses[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies]
-    apexes = [(poses[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones]
-    corners = [transforms.apply(poses[plate.link], plate_corners(plate)) for plate in scene.plates]
+    placed = [transforms.apply(T[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies for T in poses]
+    apexes = [(T[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones for T in poses]
+    corners = [transforms.apply(T[plate.link], plate_corners(plate)) for plate in scene.plates for T in poses]
     bare = dataclasses.replace(scene, cones=(), plates=())
     for view, bodies, points in (
         (scene, (floor, *scene.bodies, nothing), [*placed, *apexes, *corners]),
