@@ -93,7 +93,9 @@ class RecordingExistsError(ReplayError):
     def __init__(self, file: str, *, resumable: bool = False) -> None:
         self.file = file
         resume = " --resume to keep what is up to date," if resumable else ""
-        super().__init__(f"{file}: exists already; pass --overwrite to replace it,{resume} or -o DIR to write elsewhere")
+        super().__init__(
+            f"{file}: exists already; pass --overwrite to replace it,{resume} or -o DIR to write elsewhere"
+        )
 
 
 class WriteError(ReplayError):

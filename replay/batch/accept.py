@@ -60,7 +60,9 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
         raise InvalidValue("RUNDIR", directory, rule)
     failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]
     if failed:
-        rule = f"holds scenarios that did not pass: {', '.join(failed)}; run without them (--select) to accept the others"
+        rule = (
+            f"holds scenarios that did not pass: {', '.join(failed)}; run without them (--select) to accept the others"
+        )
         raise InvalidValue("RUNDIR", directory, rule)
     accepted = Baseline(baseline)
     entries, unchanged = {}, []

@@ -6,6 +6,7 @@ import dataclasses
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
-from replay.recording.blueprint import eye_of
+from replay.recording.blueprint import eye_of, eye_of_all
 from replay.recording.picture import _cause, picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
@@ -167,6 +168,17 @@ def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     ):
         shown, wanted = extent(dataclasses.replace(view, bodies=bodies), poses), np.concatenate(points)
         assert np.allclose([shown.min(axis=0), shown.max(axis=0)], [wanted.min(axis=0), wanted.max(axis=0)])
+
+
+def test_one_eye_sees_what_several_see() -> None:
+    def place(eye: Any) -> Any:
+        return tuple(np.array(part.as_arrow_array().to_pylist()[0]) for part in (eye.position, eye.look_target))
+
+    near, far = np.eye(3), np.eye(3) * 5.0 + [20.0, 0.0, 0.0]
+    one, other, both = (place(eye_of(points)) for points in (near, far, np.concatenate([near, far])))
+    assert np.allclose(place(eye_of_all([one, one])), one, atol=1e-6)
+    eye, target = place(eye_of_all([one, other]))
+    assert np.linalg.norm(eye - target) >= np.linalg.norm(both[0] - both[1])
 
 
 @pytest.mark.parametrize("size", [(12.0, 0.2, 0.2), (0.2, 0.2, 8.0), (1.0, 2.0, 3.0), (0.3, 0.3, 0.01)])
