@@ -1,8 +1,13 @@
-"""Everything `replay` raises on purpose: one base class, one class per cause, the values kept as attributes."""
+"""Everything `replay` raises on purpose, one class per cause, values kept as attributes; and how to say a count."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+
+def count(number: int, noun: str) -> str:
+    """Return "1 frame", "2 frames"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class ReplayError(Exception):

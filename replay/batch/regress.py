@@ -24,7 +24,7 @@ from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.rules import Rules
 from replay.comparison.runs import Case, Pair, diff_pair, read_pair
-from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError
+from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError, count
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -228,7 +228,7 @@ def _show(
         chosen = [scenario for scenario in scenarios if scenario.name in failing]
         if not chosen:
             return
-        watch.tell(f"recording {wording.count(len(chosen), 'scenario')} once more, for eyes (--rrd none leaves it out)")
+        watch.tell(f"recording {count(len(chosen), 'scenario')} once more, for eyes (--rrd none leaves it out)")
         if run_all(chosen, again, model=model, overwrite=True, execution=execution, watch=_Asked(watch)).interrupted:
             raise KeyboardInterrupt
         for name in failing:

@@ -43,7 +43,7 @@ def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
 
 
 def same_messages(a: Path, b: Path) -> bool:
-    """Return whether two files hold the same messages in all topics, as the same bytes; RecordingError as of `McapLog`."""
+    """Return whether two files hold the same messages in all topics, as the same bytes; errors as of `McapLog`."""
     with McapLog(a) as log_a, McapLog(b) as log_b:
         topics = [{channel.topic for channel in log.channels.values()} for log in (log_a, log_b)]
         return topics[0] == topics[1] == equal_topics(log_a, log_b)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from replay.comparison import wording
 from replay.comparison.difference import Change, Difference, SignalDifference, Verdict
 from replay.comparison.runs import Case, RunDifference
+from replay.errors import count
 
 SHOWN_SIGNALS = 12
 """Signals of a scenario in the short form."""
@@ -62,7 +63,7 @@ def _signals(found: Difference, verbose: bool) -> Iterator[str]:
         yield from (f"    {line}" for line in _details(item, found, verbose))
     hidden = len(found.deciding) - len(shown)
     if hidden > 0:
-        yield f"  and {wording.count(hidden, 'more changed signal')}; -v lists all"
+        yield f"  and {count(hidden, 'more changed signal')}; -v lists all"
 
 
 def _details(item: SignalDifference, found: Difference, verbose: bool) -> Iterator[str]:

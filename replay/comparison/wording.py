@@ -19,14 +19,10 @@ from replay.comparison.difference import (
 from replay.comparison.rules import EXACT, Rule
 from replay.comparison.runs import RunDifference
 from replay.comparison.signals import ROTATION_FIELD
+from replay.errors import count
 
 SHOWN_EVENTS = 5
 """Events of a signal in the short form."""
-
-
-def count(number: int, noun: str) -> str:
-    """Return "1 frame", "2 frames"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def number(value: float, unit: str = "") -> str:

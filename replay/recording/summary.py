@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from replay.errors import count
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import Provenance
@@ -57,7 +58,7 @@ class Summary:
         """Return the summary as lines for people."""
         made, width = self.provenance, max(len(topic.topic) for topic in self.topics)
         lines = [
-            f"{self.path}: {made.scenario}, {self.frames} frames, {self.seconds:g} s, {self.bytes} bytes",
+            f"{self.path}: {made.scenario}, {count(self.frames, 'frame')}, {self.seconds:g} s, {self.bytes} bytes",
             "topics",
             *(f"  {topic.topic:<{width}}  {topic.messages:>7}  {topic.schema}" for topic in self.topics),
             "provenance",
