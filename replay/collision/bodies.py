@@ -14,6 +14,7 @@ from replay.errors import InvalidValue
 from replay.geometry.bounds import fit_aabb, fit_obb, fit_sphere
 from replay.geometry.convex import ConvexSets, convex_sets
 from replay.geometry.tree import Tree
+from replay.numerics.rows import distinct_rows
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -101,7 +102,7 @@ def fit_volumes(bodies: Sequence[CollisionBody], arrays: Bodies, *, bounds: Boun
     axes = np.broadcast_to(np.identity(3), (n, 3, 3)).copy()
     for k, body in enumerate(bodies):
         begin, end = (arrays.sets.first[arrays.set_first[j]] for j in (k, k + 1))
-        points = np.unique(arrays.sets.vertices[begin:end], axis=0)
+        points = distinct_rows(arrays.sets.vertices[begin:end]).rows
         if bounds == "sphere":
             sphere = fit_sphere(points)
             center[k], radius[k] = sphere.center, sphere.radius
@@ -131,8 +132,8 @@ def _probes(sets: ConvexSets) -> Floats:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    distinct, index = np.unique(sets.vertices, axis=0, return_inverse=True)
-    corners = index.reshape(-1, 3)
+    distinct, _, kind = distinct_rows(sets.vertices)
+    corners = kind.reshape(-1, 3)
     rows, columns = np.concatenate([corners[:, :2], corners[:, 1:]]).T
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(distinct), len(distinct)))
     _, label = connected_components(graph, directed=False)

@@ -15,6 +15,7 @@ from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles
 from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
+from replay.numerics.rows import distinct_rows
 
 __all__ = ["Aabb", "Obb", "Sphere", "aabbs_meet", "fit_aabb", "fit_obb", "fit_sphere", "obbs_meet", "spheres_meet"]
 
@@ -117,7 +118,7 @@ def fit_obb(
     local, origin, scale = to_unit_box(points)
     hull = None
     if len(local) > 3:
-        local = np.unique(local, axis=0) if method == "triangles" else local
+        local = distinct_rows(local).rows if method == "triangles" else local
         hull = convex_hull(local)
     covariance = np.zeros((3, 3))
     area = 0.0
@@ -134,27 +135,27 @@ def fit_obb(
 
 def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array) -> Obb:
     """Return the box around the points along axes, sorted and signed in one way, containing them after rounding."""
-    reach = [_along(local, axis) for axis in axes]
-    order = np.argsort([np.min(value) - np.max(value) for value in reach], kind="stable")
+    reach = _along(local[:, None], axes.T)
+    order = np.argsort(reach.min(axis=0) - reach.max(axis=0), kind="stable")
     first, second = (_signed(axes[k]) for k in order[:2])
     second = second - float(_along(second, first)) * first
     second = second / np.sqrt(_along(second, second))
     x, y = first, second
     third = np.array([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
     axes = np.stack([first, second, third / np.sqrt(_along(third, third))])
+    reach = _along(local[:, None], axes.T)
     middle = np.zeros(3)
-    for axis in axes:
-        value = _along(local, axis)
-        middle += (0.5 * np.min(value) + 0.5 * np.max(value)) * axis
+    for axis, low, high in zip(axes, reach.min(axis=0), reach.max(axis=0), strict=True):
+        middle += (0.5 * low + 0.5 * high) * axis
     center = origin + scale * middle
     relative = (points - center) / scale
     slack = _ULPS * _EPS * 2.0 * float(np.max(np.abs(relative)))
-    half_widths = np.array([np.max(np.abs(_along(relative, axis))) + slack for axis in axes])
+    half_widths = np.abs(_along(relative[:, None], axes.T)).max(axis=0) + slack
     return Obb(center, scale * half_widths, axes)
 
 
 def _along(points: Array, axis: Array) -> Array:
-    """Return points . axis, the same on every machine."""
+    """Return points . axis, the same on every machine; for several axes side by side their columns (3, k)."""
     return np.asarray(points[..., 0] * axis[0] + points[..., 1] * axis[1] + points[..., 2] * axis[2])
 
 

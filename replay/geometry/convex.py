@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
-from replay.geometry.hull import convex_hull
+from replay.geometry.hull import extreme_points
 from replay.geometry.solid import Solid
 from replay.geometry.tree import Tree, build_tree
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "e
 
 def from_pieces(pieces: Sequence[Array]) -> ConvexSets:
     """Return the sets of convex pieces given by vertices (k, 3) [m]; vertices inside a piece's hull are left out."""
-    vertices = [_extreme_vertices(np.unique(np.asarray(piece, dtype=np.float64) + 0.0, axis=0)) for piece in pieces]
+    vertices = [extreme_points(distinct_rows(np.asarray(piece, dtype=np.float64) + 0.0).rows) for piece in pieces]
     first = np.concatenate([[0], np.cumsum([len(k) for k in vertices])]).astype(np.int64)
     lower = np.array([k.min(axis=0) for k in vertices])
     upper = np.array([k.max(axis=0) for k in vertices])
@@ -78,9 +79,3 @@ def _from_triangles(solid: Solid) -> ConvexSets:
         tree=build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=1),
         surface=solid.watertight,
     )
-
-
-def _extreme_vertices(points: Array) -> Array:
-    """Return the vertices of the points' hull; of flat points all."""
-    hull = convex_hull(points)
-    return points if hull is None else points[hull.vertices]

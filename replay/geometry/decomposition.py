@@ -26,6 +26,7 @@ from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import Tree, triangle_tree
 from replay.numerics.jit import kernel
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 
@@ -87,11 +88,11 @@ def _decompose(triangles: Array) -> tuple[Array, ...]:
     import vhacdx
 
     local, centre, scale = to_unit_box(triangles.reshape(-1, 3))
-    vertices, corners = np.unique(local, axis=0, return_inverse=True)
+    vertices, _, corners = distinct_rows(local)
     faces = corners.reshape(-1, 3)
     cells = np.column_stack([np.full(len(faces), 3), faces]).astype(np.uint32).ravel()  # each led by its corner count
     hulls = vhacdx.compute_vhacd(vertices, cells, maxConvexHulls=MAX_PIECES, resolution=RESOLUTION, asyncACD=False)
-    pieces = [np.unique(np.asarray(points, dtype=np.float64) + 0.0, axis=0) for points, _ in hulls]
+    pieces = [distinct_rows(np.asarray(points, dtype=np.float64) + 0.0).rows for points, _ in hulls]
     solid = [piece for piece in pieces if convex_hull(piece) is not None]  # a thinner body than a voxel may leave none
     return tuple(centre + scale * piece for piece in solid or [vertices])
 

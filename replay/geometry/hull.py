@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,20 +29,21 @@ def convex_hull(points: Array) -> Hull | None:
     Accuracy: Qhull merges facets within ~1e-15 of the extent; a point that close to a face may be left out.
     Source: Barber, Dobkin, Huhdanpaa (1996), as wrapped by SciPy.
     """
-    from scipy.spatial import ConvexHull, QhullError
-
     local, _, _ = to_unit_box(points)
-    if len(points) < 4:
-        return None
-    try:
-        hull = ConvexHull(local)
-    except QhullError:
+    hull = _qhull(local)
+    if hull is None:
         return None
     faces = hull.simplices.astype(np.int64)
     a, b, c = np.moveaxis(local[faces], 1, 0)
     inward = np.sum(np.cross(b - a, c - a) * hull.equations[:, :3], axis=1) < 0.0
     faces[inward] = faces[inward][:, [0, 2, 1]]
-    return Hull(np.sort(hull.vertices).astype(np.int64), faces)
+    return Hull(_vertices(hull), faces)
+
+
+def extreme_points(points: Array) -> Array:
+    """Return those of finite points (n, 3) that are vertices of their hull, in their order; of flat points all."""
+    hull = _qhull(to_unit_box(points)[0])
+    return points if hull is None else points[_vertices(hull)]
 
 
 def to_unit_box(points: Array) -> tuple[Array, Array, float]:
@@ -58,3 +59,18 @@ def to_unit_box(points: Array) -> tuple[Array, Array, float]:
     if not 0.0 < scale < np.inf:
         scale = 1.0
     return np.ascontiguousarray((points - centre) / scale), centre, scale
+
+
+def _qhull(local: Array) -> Any:
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(local) < 4:
+        return None
+    try:
+        return ConvexHull(local)
+    except QhullError:
+        return None
+
+
+def _vertices(hull: Any) -> Indices:
+    return np.sort(hull.vertices).astype(np.int64)

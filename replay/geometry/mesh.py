@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MeshError
-from replay.geometry.hull import convex_hull, to_unit_box
+from replay.geometry.hull import extreme_points, to_unit_box
 from replay.geometry.mesh_file import read_faces
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
 from replay.geometry.winding import corner_indices, topology, wound_against_neighbours
 from replay.numerics.jit import kernel
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 
@@ -118,9 +119,7 @@ def _have_area(triangles: Array) -> NDArray[np.bool_]:
 
 
 def _convex_corners(triangles: Array) -> Array:
-    points = np.unique(triangles.reshape(-1, 3), axis=0)
-    hull = convex_hull(points)
-    return points if hull is None else points[hull.vertices]
+    return extreme_points(distinct_rows(triangles.reshape(-1, 3)).rows)
 
 
 def _is_convex(triangles: Array) -> bool:

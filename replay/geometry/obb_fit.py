@@ -20,6 +20,7 @@ from replay.geometry.calipers import turn_about
 from replay.geometry.hull import Hull
 from replay.geometry.principal_axes import eigen
 from replay.geometry.solid import signed_volume
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 Number = TypeVar("Number", bound=np.generic)
@@ -105,8 +106,7 @@ def _distinct_directions(vectors: Array) -> Array:
     grid = np.round(unit * 1e7).astype(np.int64)
     leading = np.take_along_axis(grid, np.argmax(grid != 0, axis=1)[:, None], axis=1)[:, 0]
     grid *= np.where(leading < 0, -1, 1)[:, None]
-    _, index = np.unique(grid, axis=0, return_index=True)
-    return np.ascontiguousarray(unit[index])
+    return np.ascontiguousarray(unit[distinct_rows(grid).first])
 
 
 def _spread(rows: NDArray[Number], most: int) -> NDArray[Number]:

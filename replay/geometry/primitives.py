@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 
@@ -218,7 +219,7 @@ def _quads(corners: Array) -> Array:
 
 
 def _distinct(triangles: Array) -> Array:
-    return np.unique(triangles.reshape(-1, 3) + 0.0, axis=0)
+    return distinct_rows(triangles.reshape(-1, 3) + 0.0).rows
 
 
 def _numbers(name: str, values: Sequence[float], count: int) -> Sequence[float]:

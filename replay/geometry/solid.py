@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics import transforms
+from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class Solid:
     @property
     def vertices(self) -> Array:
         """The distinct corners (v, 3) [m], sorted by coordinates."""
-        return np.unique(self.triangles.reshape(-1, 3) + 0.0, axis=0)  # + 0.0 makes -0.0 and 0.0 one
+        return distinct_rows(self.triangles.reshape(-1, 3) + 0.0).rows  # + 0.0 makes -0.0 and 0.0 one
 
     @property
     def volume(self) -> float:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.rows import distinct_rows
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -30,7 +32,7 @@ class Topology(NamedTuple):
 
 def corner_indices(triangles: Array) -> Indices:
     """Return the corners of triangles (n, 3, 3) as indices (n, 3); corners are one where they are exactly equal."""
-    _, corners = np.unique(triangles.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)
+    corners = distinct_rows(triangles.reshape(-1, 3) + 0.0).kind
     return corners.reshape(-1, 3).astype(np.int64)
 
 
