@@ -15,7 +15,7 @@ from replay.cli.values import Memory, PathName, Seconds, ShardOf, Workers
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 scenarios_argument = click.argument("scenarios", nargs=-1, required=True, type=PathName())
-model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model, not the scenarios' own.")
+model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model (a file, or thesis2015).")
 select_option = click.option(
     "--select",
     "patterns",

@@ -12,7 +12,8 @@ from replay.cli import options
 from replay.cli.exit_codes import ExitCode
 from replay.cli.values import PathName
 
-MISSING = click.Choice(["fail", "create", "skip"])
+MISSING: Any = {"type": click.Choice(["fail", "create", "skip"]), "default": "fail", "show_default": True}
+RRD: Any = {"type": click.Choice(["failing", "all", "none"]), "default": "failing", "show_default": True}
 
 
 @click.command()
@@ -20,8 +21,8 @@ MISSING = click.Choice(["fail", "create", "skip"])
 @click.option("--baseline", type=PathName(), required=True, help="Folder of accepted recordings; see `replay accept`.")
 @options.output_option("regress")
 @click.option("--rules", type=PathName(), help="Tolerances; rules.yaml beside SCENARIOS when left out.")
-@click.option("--missing-baseline", "missing", type=MISSING, default="fail", help="What a scenario without one is.")
-@click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
+@click.option("--missing-baseline", "missing", **MISSING, help="What a scenario without one is.")
+@click.option("--rrd", **RRD, help="Scenarios to record for eyes.")
 @click.option("--history", type=PathName(), help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @options.model_option
 @options.select_option
@@ -39,7 +40,8 @@ def regress(
 ) -> ExitCode:
     """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
 
-    Exit codes: 1 something differs; 4 a scenario failed or has no baseline; 130 interrupted (the reports are partial).
+    Exit codes: 1 something differs; 2 invalid input or an unreadable baseline; 4 a scenario failed or has no baseline;
+    130 interrupted (the reports are partial).
     """
     from replay.batch.regress import regress as judge
     from replay.batch.select import Selection, rules_beside
