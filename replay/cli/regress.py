@@ -40,8 +40,7 @@ def regress(
 ) -> ExitCode:
     """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
 
-    Exit codes: 1 something differs; 2 invalid input or an unreadable baseline; 4 a scenario failed or has no baseline;
-    130 interrupted (the reports are partial).
+    Exit codes: 1 different; 2 invalid or unreadable; 4 failed or without a baseline; 130 interrupted (partial reports).
     """
     from replay.batch.regress import regress as judge
     from replay.batch.select import Selection, rules_beside
