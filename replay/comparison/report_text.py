@@ -37,9 +37,9 @@ def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]
     """Yield the lines of a scenario; `above` is the provenance that was written last."""
     found = case.difference
     yield f"{found.verdict.value}: {case.name}: {wording.summary(found)}"
-    if found.provenance:
+    repeats = found.provenance == above
+    if found.provenance and (verbose or not repeats or found.verdict is Verdict.DIFFERENT):
         decides = "decides" if found.strict_provenance else "does not decide"
-        repeats = found.provenance == above
         yield f"  provenance ({decides}){': as above' if repeats else ''}"
         if not repeats:
             yield from (f"    {wording.change(change)}" for change in found.provenance)

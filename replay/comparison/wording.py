@@ -177,11 +177,12 @@ def summary(found: Difference) -> str:
     if found.scene:
         parts.append(f"{count(len(found.scene), 'change')} of the scene")
     if found.frames.missing or found.frames.extra:
-        parts.append(f"{count(found.frames.missing + found.frames.extra, 'frame')} in one run only")
+        ignored = "" if found.frames.decides else " (ignored)"
+        parts.append(f"{count(found.frames.missing + found.frames.extra, 'frame')} in one run only{ignored}")
     for where, items in (("missing", found.missing), ("extra", found.extra)):
-        total = sum(len(item.signals) for item in items)
-        if total:
-            parts.append(f"{count(total, 'signal')} {where}")
+        for decides, ignored in ((True, ""), (False, " (ignored)")):
+            total = sum(len(item.signals) for item in items if item.decides is decides)
+            parts += [f"{count(total, 'signal')} {where}{ignored}"] if total else []
     if found.deciding:
         parts.append(f"{len(found.deciding)} of {count(found.compared, 'signal')} changed")
     if found.accepted:
