@@ -130,13 +130,13 @@ def axis_until(end: int) -> Any:
     return rrb.TimeAxis(view_range=span)
 
 
-def scene_view(eye: Any, prefix: str = "", name: str = "Scene") -> Any:
-    """Return a view of the scene below a prefix."""
+def scene_view(eye: Any, prefix: str = "", name: str = "Scene", sides: Sequence[str] = ("",)) -> Any:
+    """Return a view of the scene below a prefix, or of the scenes of several sides below it, in one."""
     import rerun.blueprint as rrb
 
     return rrb.Spatial3DView(
         origin=prefix or "/",
-        contents=[f"+ {prefix}/{SCENE}/**"],
+        contents=[f"+ {prefix}{side}/{SCENE}/**" for side in sides],
         name=name,
         background=rrb.Background(color=_BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(255, 255, 255, 18)),

@@ -33,7 +33,6 @@ LEVEL_COLORS = {Level.BOUNDS: (255, 150, 20, 255), Level.CONTACT: (235, 35, 35, 
 """Colours of a body while one of its pairs is at that level."""
 
 _BLOCKS_UNWRITTEN = 8  # the library would take blocks faster than a slow disk, and memory would grow
-_FRAMES_SHOWN = 17  # of the first block, which the first picture has room for: the motion between two of them is small
 _LOG_LEVELS = {2: "INFO", 3: "WARN", 4: "ERROR"}
 
 
@@ -74,8 +73,7 @@ class RerunWriter:
         if self._stream is None:
             self.prepare()
         if self._blocks == 0:
-            some = np.linspace(0, len(block.time) - 1, min(len(block.time), _FRAMES_SHOWN)).astype(np.int64)
-            self._corners = extent(self._scene, block.link_poses[some])
+            self._corners = extent(self._scene, block.link_poses)
         self._end = int(block.time[-1])
         self._indexes.clear()
         self._poses(block)

@@ -28,6 +28,7 @@ CURVES = (
 )
 """Colours of curves, told apart on a dark ground."""
 
+_FRAMES = 17  # that the first picture has room for: the motion between two of them is small
 _CORNERS = np.array([[[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]], dtype=np.bool_)
 
 
@@ -81,7 +82,7 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
 
     Args:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
-        link_poses: (F, L, 4, 4), T_world_link in some frames.
+        link_poses: (F, L, 4, 4), T_world_link; at most 17 of the frames are looked at, evenly spread.
     """
     spans = [(cone.link, cone.T_link_sensor[:3, 3][None]) for cone in scene.cones]
     spans += [(plate.link, plate_corners(plate)) for plate in scene.plates]
@@ -97,7 +98,10 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
     if not spans:
         return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
     links = np.repeat([link for link, _ in spans], [len(points) for _, points in spans])
-    return transforms.apply(link_poses[:, links], np.concatenate([points for _, points in spans])).reshape(-1, 3)
+    frames = np.linspace(0, len(link_poses) - 1, min(len(link_poses), _FRAMES)).astype(np.int64)
+    return transforms.apply(
+        link_poses[frames[:, None], links], np.concatenate([points for _, points in spans])
+    ).reshape(-1, 3)
 
 
 def _mesh(corners: Floats, normals: Floats, color: Color | None) -> list[Column]:

@@ -233,6 +233,9 @@ def test_the_overlay_shows_both_runs_and_the_moments(folders, tmp_path):
                 columns[str(chunk.entity_path), name.rpartition(":")[2]] = column.to_pylist()
     entities = {entity for entity, _ in columns}
     assert {"/baseline/scene/arm/beam", "/candidate/scene/arm/beam", "/summary"} <= entities
+    assert columns["/baseline/scene/arm/beam", "vertex_normals"]  # without them the viewer draws no shades
+    names = [v for (entity, kind), v in columns.items() if kind == "names" and entity.endswith(r"right\/distance")]
+    assert sorted(names) == [[["baseline: right"]], [["candidate: right"]], [["right"]]]
     assert columns["/baseline/scene/arm/beam", "albedo_factor"] != columns["/candidate/scene/arm/beam", "albedo_factor"]
     errors = next(v for (entity, kind), v in columns.items() if "right" in entity and entity.startswith("/difference"))
     assert len(errors) == 100
