@@ -70,6 +70,21 @@ class Node:
             return [node.data() for node in self.value]
         return self.value
 
+    def copy(self, made: dict[int, Node]) -> Node:
+        """Return a tree that can be changed by itself; what aliases share stays shared.
+
+        Args:
+            made: the copies so far, by the identity of what they are copies of; an empty dictionary at first.
+        """
+        if id(self) not in made:
+            value = self.value
+            made[id(self)] = node = Node(self.place, value, dict(self.keys), self.text, self.size, self.whole)
+            if isinstance(value, dict):
+                node.value = {key: child.copy(made) for key, child in value.items()}
+            elif isinstance(value, list):
+                node.value = [child.copy(made) for child in value]
+        return made[id(self)]
+
     def shown(self) -> str:
         """Return the value for a message, in at most about 60 characters."""
         if isinstance(self.value, dict):

@@ -6,6 +6,7 @@ The events come from ruamel.yaml's scanner; what a plain scalar means is decided
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Iterator
@@ -28,6 +29,9 @@ MAX_NODES: Final = 200_000
 MAX_DIGITS: Final = 400
 """Characters of one number."""
 
+_KEPT_BYTES: Final = 64 << 10  # of one file; what is longer is seldom shared, and its tree is large
+_KEPT_FILES: Final = 64
+
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _INFINITY = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
@@ -45,6 +49,8 @@ class _Rejected(Exception):
 def parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
     """Read one YAML document.
 
+    The scenarios of a night share what they include: such files are read once, and their trees are copied.
+
     Args:
         data: the file's bytes, UTF-8.
         file: the name that places carry.
@@ -53,6 +59,20 @@ def parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
     Returns:
         The root node, or None when the text is not YAML or empty.
     """
+    root, found = _kept(data, file) if len(data) <= _KEPT_BYTES else _read(data, file)
+    problems.extend(found)
+    return root if root is None else root.copy({})
+
+
+def _read(data: bytes, file: str) -> tuple[Node | None, list[Problem]]:
+    problems: list[Problem] = []
+    return _parse(data, file, problems), problems
+
+
+_kept = functools.lru_cache(maxsize=_KEPT_FILES)(_read)
+
+
+def _parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
     if len(data) > MAX_BYTES:
         problems.append(Problem(f"the file has {len(data)} bytes; at most {MAX_BYTES} are read", file=file))
         return None

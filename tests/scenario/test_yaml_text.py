@@ -143,3 +143,15 @@ def test_damaged_text_is_a_tree_or_a_problem_and_never_a_crash(edits):
         text[position : position + removed] = bytes([added])
     node, problems = read(bytes(text))
     assert problems or isinstance(node, Node)
+
+
+def test_a_text_read_again_is_a_tree_of_its_own_with_the_same_problems():
+    text = b"a: &x {b: [1, 2]}\nc: *x\nd: 0\nd: 1\n"
+    (first, found), (again, found_again) = read(text), read(text)
+    assert first.data() == again.data() and found == found_again and len(found) == 1
+    assert again.mapping["a"] is again.mapping["c"], "an alias is what its anchor is"
+    first.mapping["a"].mapping["b"].sequence.append(first.mapping["d"])
+    del first.mapping["d"], first.keys["d"]
+    (last, _) = read(text)
+    assert last.data() == again.data() == {"a": {"b": [1, 2]}, "c": {"b": [1, 2]}, "d": 0}
+    assert set(last.keys) == {"a", "c", "d"}
