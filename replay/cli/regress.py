@@ -51,7 +51,7 @@ def regress(
     settings = options.settings(how)
     selection = Selection.of(scenarios, patterns, shard)
     if not selection.chosen:
-        return options.nothing(patterns)
+        return options.nothing(patterns, shard)
     rules = rules or rules_beside(scenarios)
     settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or "", "history": history}

@@ -61,6 +61,8 @@ def test_a_recording_runs_again_from_its_attachments_alone(recorded, tmp_path):
 def test_nothing_selected_is_exit_code_5(scenario, tmp_path, capsys):
     assert run(["run", str(scenario), "--select", "tag:none", "-o", str(tmp_path)]) is ExitCode.NOTHING
     assert "nothing selected by tag:none" in capsys.readouterr().err
+    assert run(["run", str(scenario), "--select", "swing", "--shard", "2/2", "-o", str(tmp_path)]) is ExitCode.NOTHING
+    assert "nothing selected by swing in part 2 of 2" in capsys.readouterr().err
     assert run(["validate", str(scenario), "--select", "sw*"]) is ExitCode.FINE
 
 
