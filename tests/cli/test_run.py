@@ -89,6 +89,7 @@ def test_a_crash_fails_its_scenario_and_no_other(tmp_path, monkeypatch, capsys):
     text = capsys.readouterr().out
     assert "raise_first: crashed" in text and "MemoryError: no room for 8 GiB" in text
     assert "second: passed" in text
+    assert text.endswith("\n2 scenarios: 1 crashed (raise_first), 1 passed\n")
     folder = tmp_path / "out" / "raise_first"
     assert "Traceback" in (folder / "log.txt").read_text()
     assert sorted(file.name for file in folder.iterdir()) == ["log.txt", "result.json"]
