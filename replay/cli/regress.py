@@ -49,7 +49,7 @@ def regress(
     from replay.comparison.rules_file import read_rules
 
     settings = options.settings(how)
-    selection = Selection.of(scenarios, patterns, shard)
+    selection = Selection.of(scenarios, patterns, shard, tolerant=True)
     if not selection.chosen:
         return options.nothing(patterns, shard)
     rules = rules or rules_beside(scenarios)
