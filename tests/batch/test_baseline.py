@@ -13,6 +13,7 @@ from replay.comparison.runs import diff
 from replay.errors import RecordingError
 from replay.geometry import primitives
 from replay.recording.slim import attached_files
+from replay.recording.summary import summarize
 
 NOW = datetime.datetime(2027, 3, 1, 2, 0, tzinfo=datetime.UTC)
 TEXT = """
@@ -52,6 +53,7 @@ def test_slim_recordings_share_their_meshes_and_say_all_that_the_whole_ones_do(r
     assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
     slim, whole = baseline.recording("a"), run / "a" / "a.mcap"
     assert slim.stat().st_size < whole.stat().st_size - mesh.stat().st_size
+    assert "  elsewhere  ball.stl" in summarize(slim).as_text()
     found = diff(slim, whole)
     assert found.verdict.value == "same"
     assert not found.provenance
