@@ -66,7 +66,10 @@ class Summary:
             "  model " + ", ".join(f"{key} {value}" for key, value in sorted(made.model.items())),
             "  libraries " + ", ".join(f"{name} {version}" for name, version in sorted(made.libraries.items())),
             "files",
-            *(f"  {digest[:16]}  {self.files.get(name, 'elsewhere'):>9}  {name}" for name, digest in sorted(made.files.items())),
+            *(
+                f"  {sha[:16]}  {self.files.get(name, 'elsewhere'):>9}  {name}"
+                for name, sha in sorted(made.files.items())
+            ),
         ]
         return "\n".join(lines)
 
