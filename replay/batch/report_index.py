@@ -73,10 +73,6 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
     return page
 
 
-def _row(found: Regression, item: Judged, since: str) -> Row:
-    return Row(item, since, _links(found, item), command(found, item), _log(found, item))
-
-
 def command(found: Regression, item: Judged) -> str:
     """Return the command that runs and compares one scenario again."""
     parts = ["replay", "regress", item.source, "--select", item.name]
