@@ -65,7 +65,8 @@ def report(found: Regression, *, history: Path | None) -> ExitCode:
     write_reports(found, history=history)
     click.echo("\n".join([*describe(found), f"report: {found.run.directory / INDEX}"]))
     interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
-    return worst([interrupted, *(exit_code_of(item.verdict.name) for item in found.judged)])
+    invalid = ExitCode.INVALID if any(result.invalid for result in found.run.results) else ExitCode.FINE
+    return worst([interrupted, invalid, *(exit_code_of(item.verdict.name) for item in found.judged)])
 
 
 def exit_code_of(verdict: str) -> ExitCode:

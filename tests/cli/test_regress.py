@@ -133,7 +133,7 @@ def test_one_scenario_with_a_mistake_does_not_cost_the_night(tmp_path, capsys):
     wrong.write_text("version: 1\nname: plain_1 # of three\nrate: fast\nduration: 1\nlinks: {}\n")
     out = tmp_path / "out"
     capsys.readouterr()
-    assert night(tmp_path, out) is ExitCode.FAILED
+    assert night(tmp_path, out) is ExitCode.INVALID
     said = capsys.readouterr().out
     assert f"plain_1: failed: {wrong}:3:7: rate = 'fast'" in said
     assert "unused" not in said
@@ -145,10 +145,10 @@ def test_one_scenario_with_a_mistake_does_not_cost_the_night(tmp_path, capsys):
     assert night(tmp_path, out, "--select", "plain_0") is ExitCode.FINE  # not asked for
     assert night(tmp_path, out, "--select", "plain_1") is ExitCode.INVALID  # nothing else asked for
     assert night(tmp_path, out, "--shard", "2/2") is ExitCode.FINE  # told in the first part
-    assert night(tmp_path, out, "--shard", "1/2", "--select", "tag:quick") is ExitCode.FAILED
+    assert night(tmp_path, out, "--shard", "1/2", "--select", "tag:quick") is ExitCode.INVALID
     (tmp_path / "in" / "other.yaml").write_text("version: 1\nname: [\n")  # named by its file then
     assert night(tmp_path, out, "--select", "*er") is ExitCode.INVALID
-    assert night(tmp_path, out, "--select", "other", "--select", "plain_2") is ExitCode.FAILED
+    assert night(tmp_path, out, "--select", "other", "--select", "plain_2") is ExitCode.INVALID
     assert verdicts_of(out)["other"] == "failed"
 
 
