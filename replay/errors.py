@@ -1,8 +1,13 @@
-"""Everything `replay` raises on purpose: one base class, one class per cause, the values kept as attributes."""
+"""Everything `replay` raises on purpose, one class per cause, values kept as attributes; and how to say a count."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+
+def count(number: int, noun: str) -> str:
+    """Return "1 frame", "2 frames"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class ReplayError(Exception):
@@ -36,10 +41,10 @@ class Problem:
 
 
 class ScenarioError(ReplayError):
-    """A scenario (or a file it includes) is not valid; every problem found is listed, one line each."""
+    """A scenario (or a file it includes) is not valid; every problem found is listed once, one line each."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
-        self.problems = tuple(problems)
+        self.problems = tuple({str(problem): problem for problem in problems}.values())
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
@@ -90,9 +95,12 @@ class RecordingError(ReplayError):
 class RecordingExistsError(ReplayError):
     """The target of a run exists already and overwriting was not asked for."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, *, resumable: bool = False) -> None:
         self.file = file
-        super().__init__(f"{file}: exists already; pass --overwrite to replace it, or -o DIR to write elsewhere")
+        resume = " --resume to keep what is up to date," if resumable else ""
+        super().__init__(
+            f"{file}: exists already; pass --overwrite to replace it,{resume} or -o DIR to write elsewhere"
+        )
 
 
 class WriteError(ReplayError):

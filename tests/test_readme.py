@@ -32,10 +32,8 @@ def rounded(text: str) -> str:
 
 def test_the_worked_example_says_what_the_readme_shows(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    begin, *lines = next(block for block in blocks("sh") if "thesis2015" in block).splitlines()
-    names = {"$SCENES": re.search('"(.*)"', begin)[1]}
-    for line in lines:
-        words = shlex.split(line.replace("$SCENES", names["$SCENES"]))
+    for line in next(block for block in blocks("sh") if "thesis2015" in block).splitlines():
+        words = shlex.split(line)
         made = ("thesis", "ours", "difference.html", "differences")
         command = [str(tmp_path / word) if word in made else word for word in words]
         capsys.readouterr()

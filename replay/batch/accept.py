@@ -13,7 +13,7 @@ from replay.comparison import wording
 from replay.comparison.difference import Difference, Verdict
 from replay.comparison.provenance import FILES
 from replay.comparison.runs import diff
-from replay.errors import InvalidValue
+from replay.errors import InvalidValue, RecordingError
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
 
     Raises:
         InvalidValue: it is no run folder, the run was interrupted, or a scenario of it failed or broke an expectation.
-        RecordingError: a recording cannot be read.
+        RecordingError: a recording of the run cannot be read.
     """
     try:
         run = json.loads((directory / "run.json").read_text(encoding="utf-8"))
@@ -60,18 +60,33 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
         raise InvalidValue("RUNDIR", directory, rule)
     failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]
     if failed:
-        raise InvalidValue("RUNDIR", directory, f"holds scenarios that did not pass: {', '.join(failed)}")
+        rule = (
+            f"holds scenarios that did not pass: {', '.join(failed)}; run without them (--select) to accept the others"
+        )
+        raise InvalidValue("RUNDIR", directory, rule)
     accepted = Baseline(baseline)
     entries, unchanged = {}, []
     for name in statuses:
         recording = directory / name / f"{name}.mcap"
-        before = accepted.recording(name)
-        found = None if before is None else diff(before, recording)
-        if found is not None and _same(found):
-            unchanged.append(name)
+        what = _news(accepted.recording(name), recording)
+        if what:
+            entries[name] = Entry(recording, what)
         else:
-            entries[name] = Entry(recording, "new" if found is None else wording.summary(found))
+            unchanged.append(name)
     return Acceptance(accepted, entries, tuple(unchanged))
+
+
+def _news(before: Path | None, recording: Path) -> str:
+    """Return what is new about a recording; "" when its baseline says the same already."""
+    if before is None:
+        return "new"
+    try:
+        found = diff(before, recording)
+    except RecordingError as error:
+        if error.file != str(before):
+            raise
+        return f"replaces a baseline that cannot be read: {error.reason}"
+    return "" if _same(found) else wording.summary(found)
 
 
 def _same(found: Difference) -> bool:

@@ -91,17 +91,22 @@ class Baseline:
 
     def _undo(self, new: bool) -> None:
         """Remove the meshes of recordings that were not stored, and the folders that are empty without them."""
-        with contextlib.suppress(RecordingError, OSError):
-            self._remove_unneeded()
+        self._remove_unneeded()
+        with contextlib.suppress(OSError):
             (self.directory / OBJECTS).rmdir()
-            if new:
+        if new:
+            with contextlib.suppress(OSError):
                 self.directory.rmdir()
 
     def _remove_unneeded(self) -> None:
+        """Remove the meshes that no recording needs; all stay when one cannot be read, which may need any."""
         needed: set[str] = set()
         for name in self.names():
-            with McapLog(self._path(name)) as log:
-                needed.update(read_provenance(log).files.values())
+            try:
+                with McapLog(self._path(name)) as log:
+                    needed.update(read_provenance(log).files.values())
+            except RecordingError:
+                return
         for file in (self.directory / OBJECTS).glob("*"):
             if file.name not in needed:
                 with contextlib.suppress(OSError):

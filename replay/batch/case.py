@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from replay.errors import NoSpaceError, ReplayError, ScenarioError
+from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.covered import CoveredSensors
 from replay.scenario.verdict import ExpectationCheck, Outcome
@@ -166,7 +166,7 @@ def describe(result: CaseResult) -> list[str]:
         return [f"{result.name}: {result.status.value}", *(f"  {line}" for line in result.error.splitlines())]
     pace = f" ({result.frames / result.seconds:.0f} a second)" if result.seconds > 0.0 else ""
     took = "reused" if result.reused else f"in {result.seconds:.1f} s{pace}"
-    lines = [f"{result.name}: {result.status.value}, {result.frames} frames {took}"]
+    lines = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
     for outcome in result.outcomes:
         lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
     lines.extend(f"  note: {note}" for note in result.notes)

@@ -81,7 +81,7 @@ class Regression:
         rules: file of tolerances; "" for none.
         model: file or name of the model that replaces the scenarios' own; "" for none.
         judged: all scenarios, in the order in which they were given, and then those that were skipped.
-        unused: scenarios that have a baseline and were not among those given.
+        unused: scenarios that have a baseline and were not among those of the folders given; none for single files.
     """
 
     run: Run

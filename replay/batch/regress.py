@@ -19,11 +19,12 @@ from replay.batch.select import Selection
 from replay.batch.watch import Unwatched, Watch
 from replay.comparison import wording
 from replay.comparison.difference import Verdict as DiffVerdict
+from replay.comparison.log_changes import same_messages
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.rules import Rules
 from replay.comparison.runs import Case, Pair, diff_pair, read_pair
-from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError
+from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError, count
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -70,21 +71,24 @@ def regress(
         raise InvalidValue("--baseline", baseline, "is a file; give the folder that `replay accept` writes")
     check_history(history)
     accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
-    _forget(directory, [scenario.name for scenario in selection.chosen])
+    failed = [CaseResult(name, Status.FAILED, error=str(e), invalid=True) for name, e in selection.invalid.items()]
+    _forget(directory, [*(scenario.name for scenario in selection.chosen), *selection.invalid])
     run = run_all(
         selection.chosen,
         directory,
         model=model,
         rrd=rrd == "all",
         overwrite=True,
+        failed=failed,
         execution=execution,
         watch=watch,
     )
     if run.interrupted:
         watch = Unwatched()  # it has told its request; another one ends the comparison too
     judged: dict[str, Judged] = {}
+    ran = list(zip(selection.chosen, run.results, strict=False))  # those that failed before come after these
     try:
-        for scenario, result in zip(selection.chosen, run.results, strict=True):
+        for scenario, result in ran:
             watch.compare(scenario.name)
             judged[scenario.name] = _judge(scenario, result, accepted, rules, missing, overlay=rrd != "none")
         judged |= _created(judged, accepted)
@@ -96,14 +100,25 @@ def regress(
     for name in [name for name, item in judged.items() if item.verdict is Verdict.CREATED]:
         if accepted.recording(name) is None:  # ended before it was stored
             del judged[name]
-    ended = [
-        judged.get(scenario.name) or _unjudged(scenario, result)
-        for scenario, result in zip(selection.chosen, run.results, strict=True)
-    ]
+    ended = [judged.get(scenario.name) or _unjudged(scenario.name, result) for scenario, result in ran]
+    ended += [_unjudged(result.name, result) for result in failed]
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
-    unused = sorted(set(accepted.names()) - {item.name for item in ended})
+    unused = _unused(selection, accepted, {item.name for item in ended})
+    ended = [_renamed(item, accepted, unused) for item in ended]
     return Regression(run, baseline, rules_file, model_name, tuple(ended), tuple(unused))
+
+
+def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
+    """Say of a scenario without a baseline which unused one is byte by byte the same: it may have been renamed."""
+    if item.verdict is not Verdict.MISSING:
+        return item
+    for name in unused:
+        with contextlib.suppress(RecordingError):
+            if same_messages(accepted.directory / name / f"{name}.mcap", _mcap(item)):
+                message = f"{item.message}; the unused baseline {name} has exactly the same readings: renamed?"
+                return dataclasses.replace(item, message=message)
+    return item
 
 
 def _forget(directory: Path, names: Sequence[str]) -> None:
@@ -114,12 +129,19 @@ def _forget(directory: Path, names: Sequence[str]) -> None:
             file.unlink(missing_ok=True)
 
 
-def _unjudged(scenario: Scenario, result: CaseResult) -> Judged:
+def _unused(selection: Selection, accepted: Baseline, told: set[str]) -> list[str]:
+    """Return which baselines are of no scenario of the folders; a sweep that is not valid may still be of its cases."""
+    sweeps = tuple(f"{name}[" for name in selection.invalid)
+    names = accepted.names() if selection.of_folders else []
+    return [name for name in names if name not in told and not name.startswith(sweeps)]
+
+
+def _unjudged(name: str, result: CaseResult) -> Judged:
     """Return the verdict of a scenario that has not been compared, because it failed or the run was ended."""
     if result.status.recorded:
         message = "the run was ended before it was compared"
-        return Judged(scenario.name, Verdict.INTERRUPTED, message, result)
-    return Judged(scenario.name, Verdict(result.status.value), result.error, result)
+        return Judged(name, Verdict.INTERRUPTED, message, result)
+    return Judged(name, Verdict(result.status.value), result.error, result)
 
 
 def _created(judged: Mapping[str, Judged], accepted: Baseline) -> dict[str, Judged]:
@@ -148,7 +170,7 @@ def _judge(
     overlay: bool,
 ) -> Judged:
     if not result.status.recorded or result.recordings is None:
-        return _unjudged(scenario, result)
+        return _unjudged(scenario.name, result)
     accepted = baseline.recording(scenario.name)
     verdict, message = Verdict.SAME, ""
     comparison: Case | None = None
@@ -214,7 +236,7 @@ def _show(
         chosen = [scenario for scenario in scenarios if scenario.name in failing]
         if not chosen:
             return
-        watch.tell(f"recording {wording.count(len(chosen), 'scenario')} once more, for eyes (--rrd none leaves it out)")
+        watch.tell(f"recording {count(len(chosen), 'scenario')} once more, for eyes (--rrd none leaves it out)")
         if run_all(chosen, again, model=model, overwrite=True, execution=execution, watch=_Asked(watch)).interrupted:
             raise KeyboardInterrupt
         for name in failing:

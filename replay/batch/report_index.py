@@ -15,6 +15,7 @@ from urllib.parse import quote
 import replay
 from replay.batch.judged import LOG, OVERLAY, Judged, Regression, Verdict
 from replay.comparison import report_html
+from replay.errors import count
 
 _FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, LOG, "result.json")
 _ORDER = [verdict for verdict in Verdict if not verdict.fine] + [verdict for verdict in Verdict if verdict.fine]
@@ -62,6 +63,7 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
         failing=len(failing),
         counts=[(verdict, found.count(verdict)) for verdict in _ORDER if found.count(verdict)],
         open=len(failing) <= _OPEN,
+        count=count,
         style=report_html.style(),
         details=report_html.details,
         folder=Path.cwd(),
@@ -69,10 +71,6 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
         host=platform.node(),
     )
     return page
-
-
-def _row(found: Regression, item: Judged, since: str) -> Row:
-    return Row(item, since, _links(found, item), command(found, item), _log(found, item))
 
 
 def command(found: Regression, item: Judged) -> str:

@@ -11,8 +11,7 @@ from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
 from replay.batch.run import as_json
-from replay.comparison import wording
-from replay.errors import WriteError
+from replay.errors import WriteError, count
 from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
@@ -68,10 +67,10 @@ def describe(found: Regression) -> list[str]:
     failing = [item for item in found.judged if not item.verdict.fine]
     lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
     if found.unused:
-        number = wording.count(len(found.unused), "unused baseline")
-        lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}")
+        number = count(len(found.unused), "unused baseline")
+        lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}; delete the folder of what is gone")
     lines += ["interrupted: the reports are partial"] if found.run.interrupted else []
     counts = {verdict: found.count(verdict) for verdict in dict.fromkeys(item.verdict for item in found.judged)}
     parts = [f"{number} {verdict.value}" for verdict, number in counts.items()]
-    lines.append(f"{wording.count(len(found.judged), 'scenario')}: {', '.join(parts)}")
+    lines.append(f"{count(len(found.judged), 'scenario')}: {', '.join(parts)}")
     return lines

@@ -86,6 +86,7 @@ def run_all(
     savings: bool = True,
     overwrite: bool = False,
     resume: bool = False,
+    failed: Sequence[CaseResult] = (),
     execution: Execution | None = None,
     watch: Watch | None = None,
 ) -> Run:
@@ -103,6 +104,7 @@ def run_all(
         savings: see `simulation.simulate`.
         overwrite: replace recordings that exist; one whose scenario now fails is removed.
         resume: keep the results of an earlier run that are still valid, and replace the others.
+        failed: results of scenarios that failed before they could be run; they come last.
         execution: where, and within which limits.
         watch: follows the run.
 
@@ -126,7 +128,7 @@ def run_all(
         for scenario in scenarios:
             for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
                 if recording.exists():
-                    raise RecordingExistsError(str(recording))
+                    raise RecordingExistsError(str(recording), resumable=True)
     left = [scenario for scenario in scenarios if scenario.name not in results]
     costs = {scenario.name: expected_cost(scenario) for scenario in left}
     workers = min(execution.workers or os.cpu_count() or 1, max(len(left), 1))
@@ -135,12 +137,17 @@ def run_all(
     def write_summary() -> Run:
         lost = "the run was ended before this scenario was"
         ended = [results.get(s.name, CaseResult(s.name, Status.INTERRUPTED, error=lost)) for s in scenarios]
+        ended += failed
         seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
         run = Run(directory, tuple(ended), interrupted, started, seconds, workers)
         write_file(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
         return run
 
     write_summary()
+    for result in failed:
+        with contextlib.suppress(OSError):  # what an earlier run said
+            (directory / result.name / "log.txt").unlink(missing_ok=True)
+        _finish(result, directory / result.name)
     try:
         watch.plan(costs)
         tasks = []

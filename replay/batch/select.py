@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ RULES = "rules.yaml"
 RECORDINGS = (".mcap", ".mcap.part")
 """What names of recordings end in, finished and unfinished ones."""
 _VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
+_NAME_KEY = re.compile(rb"^name[ \t]*:[ \t]*([A-Za-z0-9_][A-Za-z0-9_.-]*)[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 
 
 def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
@@ -65,18 +66,22 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
         RecordingError: a recording cannot be read.
         InvalidValue: see `find_scenarios`.
     """
-    return [scenario for scenario, _ in _load(paths)]
+    loaded, invalid = _load(paths)
+    _refuse(invalid)
+    return [scenario for scenario, _ in loaded]
 
 
-def _load(paths: Sequence[str | Path]) -> list[tuple[Scenario, Path]]:
+def _load(paths: Sequence[str | Path]) -> tuple[list[tuple[Scenario, Path]], dict[Path, ScenarioError]]:
+    """Return scenarios with their files, and what is wrong with the files that are not valid."""
     scenarios: list[tuple[Scenario, Path]] = []
     problems: list[Problem] = []
+    invalid: dict[Path, ScenarioError] = {}
     homes: dict[str, Path] = {}
     for path in find_scenarios(paths):
         try:
             found = [_attached(path)] if path.name.endswith(RECORDINGS) else load_cases(path)
         except ScenarioError as error:
-            problems.extend(error.problems)
+            invalid[path] = error
             continue
         for scenario in found:
             if scenario.name in homes:
@@ -84,9 +89,15 @@ def _load(paths: Sequence[str | Path]) -> list[tuple[Scenario, Path]]:
                 problems.append(Problem(rule, file=str(path)))
             homes[scenario.name] = path
             scenarios.append((scenario, path))
-    if problems:
-        raise ScenarioError(problems)
-    return scenarios
+    if problems:  # of two scenarios with one name, nobody knows which is meant
+        _refuse(invalid, problems)
+    return scenarios, invalid
+
+
+def _refuse(invalid: Mapping[Path, ScenarioError], problems: Sequence[Problem] = ()) -> None:
+    found = [*(problem for error in invalid.values() for problem in error.problems), *problems]
+    if found:
+        raise ScenarioError(found)
 
 
 def select(scenarios: Sequence[Scenario], patterns: Sequence[str]) -> list[Scenario]:
@@ -104,32 +115,68 @@ class Selection:
         chosen: the scenarios to run.
         skipped: those that were filtered out, by name, with the reason.
         sources: the file that each comes from, as the user named it.
+        of_folders: whether a folder was named: then these are all scenarios that there are.
+        invalid: what is wrong with files among them that are not valid, by the name that the scenario would have.
     """
 
     chosen: tuple[Scenario, ...]
     skipped: Mapping[str, str]
     sources: Mapping[str, Path]
+    of_folders: bool
+    invalid: Mapping[str, ScenarioError]
 
     @staticmethod
-    def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
-        """Return what paths, patterns and a shard select; errors as of `load_all`."""
-        loaded = _load(paths)
+    def of(
+        paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None, *, tolerant: bool = False
+    ) -> Selection:
+        """Return what paths, patterns and a shard select; errors as of `load_all`.
+
+        When `tolerant`, files that are not valid are told in the selection, if there is a valid one in it. What tags
+        they have is not known, so every pattern for tags selects them; they are in the first shard.
+        """
+        loaded, wrong = _load(paths)
+        if not tolerant:
+            _refuse(wrong)
         everything = [scenario for scenario, _ in loaded]
         matching = select(everything, patterns)
         chosen = shard.of(matching) if shard else matching
         names = {scenario.name for scenario in matching}, {scenario.name for scenario in chosen}
         skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
         skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
-        return Selection(tuple(chosen), skipped, {scenario.name: path for scenario, path in loaded})
+        sources = {scenario.name: path for scenario, path in loaded}
+        named = {_name_in(path, sources): path for path in wrong}
+        if len(named) < len(wrong):
+            _refuse(wrong)
+        mine = shard is None or shard.index == 1
+        named = {name: path for name, path in named.items() if mine and (not patterns or _any_matches(name, patterns))}
+        invalid = {name: wrong[path] for name, path in named.items()}
+        if not chosen:
+            _refuse({named[name]: error for name, error in invalid.items()})
+        of_folders = any(Path(path).is_dir() for path in paths)
+        return Selection(tuple(chosen), skipped, sources | named, of_folders, invalid)
+
+
+def _name_in(path: Path, taken: Collection[str]) -> str:
+    """Return the name that a file which is not valid gives its scenario; that of the file when there is none."""
+    found = _NAME_KEY.search(path.read_bytes())
+    name = found[1].decode() if found else path.stem
+    return path.stem if name in taken else name
+
+
+def _any_matches(name: str, patterns: Sequence[str]) -> bool:
+    return any(pattern.startswith("tag:") or _name_matches(name, pattern) for pattern in patterns)
 
 
 def _matches(scenario: Scenario, pattern: str) -> bool:
-    """Return whether a pattern selects a scenario; a name itself does even when it holds brackets."""
-    if scenario.name == pattern:
-        return True
-    if pattern.startswith("tag:"):
+    """Return whether a pattern selects a scenario."""
+    if pattern.startswith("tag:") and scenario.name != pattern:
         return any(fnmatch.fnmatchcase(tag, pattern.removeprefix("tag:")) for tag in scenario.tags)
-    return fnmatch.fnmatchcase(scenario.name, pattern)
+    return _name_matches(scenario.name, pattern)
+
+
+def _name_matches(name: str, pattern: str) -> bool:
+    """Return whether a pattern stands for a name; a name itself does even when it holds brackets."""
+    return name == pattern or fnmatch.fnmatchcase(name, pattern)
 
 
 def _attached(path: Path) -> Scenario:

@@ -56,4 +56,5 @@ def diff(
         click.echo(suggest(found), nl=False)
     else:
         say(form, lambda: text(found, verbose=verbose).rstrip("\n"), found.as_json)
-    return ExitCode.DIFFERENT if found.verdict is Verdict.DIFFERENT else ExitCode.FINE
+    codes = {Verdict.DIFFERENT: ExitCode.DIFFERENT, Verdict.UNREADABLE: ExitCode.INVALID}
+    return codes.get(found.verdict, ExitCode.FINE)

@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.values import Memory, PathName, Seconds, ShardOf, Workers
 
+if TYPE_CHECKING:
+    from replay.batch.shard import Shard
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 scenarios_argument = click.argument("scenarios", nargs=-1, required=True, type=PathName())
-model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model, not the scenarios' own.")
+model_option = click.option("--model", metavar="FILE|NAME", help="Compute with this model (a file, or thesis2015).")
 select_option = click.option(
     "--select",
     "patterns",
@@ -72,7 +75,8 @@ def note(message: str) -> None:
     click.echo(f"replay: {message}", err=True)
 
 
-def nothing(patterns: Sequence[str]) -> ExitCode:
+def nothing(patterns: Sequence[str], shard: Shard | None = None) -> ExitCode:
     """Say that no scenario is left to work on."""
-    note(f"nothing selected{' by ' if patterns else ''}{', '.join(patterns)}")
+    by = f" by {', '.join(pattern or repr(pattern) for pattern in patterns)}" if patterns else ""
+    note(f"nothing selected{by}{f' in part {shard.index} of {shard.count}' if shard else ''}")
     return ExitCode.NOTHING

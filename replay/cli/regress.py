@@ -12,7 +12,8 @@ from replay.cli import options
 from replay.cli.exit_codes import ExitCode
 from replay.cli.values import PathName
 
-MISSING = click.Choice(["fail", "create", "skip"])
+MISSING: Any = {"type": click.Choice(["fail", "create", "skip"]), "default": "fail", "show_default": True}
+RRD: Any = {"type": click.Choice(["failing", "all", "none"]), "default": "failing", "show_default": True}
 
 
 @click.command()
@@ -20,8 +21,8 @@ MISSING = click.Choice(["fail", "create", "skip"])
 @click.option("--baseline", type=PathName(), required=True, help="Folder of accepted recordings; see `replay accept`.")
 @options.output_option("regress")
 @click.option("--rules", type=PathName(), help="Tolerances; rules.yaml beside SCENARIOS when left out.")
-@click.option("--missing-baseline", "missing", type=MISSING, default="fail", help="What a scenario without one is.")
-@click.option("--rrd", type=click.Choice(["failing", "all", "none"]), default="failing", help="What to make for eyes.")
+@click.option("--missing-baseline", "missing", **MISSING, help="What a scenario without one is.")
+@click.option("--rrd", **RRD, help="Scenarios to record for eyes.")
 @click.option("--history", type=PathName(), help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @options.model_option
 @options.select_option
@@ -39,7 +40,7 @@ def regress(
 ) -> ExitCode:
     """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
 
-    Exit codes: 1 something differs; 4 a scenario failed or has no baseline; 130 interrupted (the reports are partial).
+    Exit codes: 1 different; 2 invalid or unreadable; 4 failed or without a baseline; 130 interrupted (partial reports).
     """
     from replay.batch.regress import regress as judge
     from replay.batch.select import Selection, rules_beside
@@ -48,9 +49,9 @@ def regress(
     from replay.comparison.rules_file import read_rules
 
     settings = options.settings(how)
-    selection = Selection.of(scenarios, patterns, shard)
+    selection = Selection.of(scenarios, patterns, shard, tolerant=True)
     if not selection.chosen:
-        return options.nothing(patterns)
+        return options.nothing(patterns, shard)
     rules = rules or rules_beside(scenarios)
     settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or "", "history": history}

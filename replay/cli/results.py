@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def show(form: str, run: Run) -> None:
-    """Write what became of each scenario, and where its recordings are."""
+    """Write what became of each scenario, and where its recordings are; of several, how many there are of each end."""
     from replay.batch.case import describe
 
     def text(result: CaseResult) -> str:
@@ -27,7 +27,25 @@ def show(form: str, run: Run) -> None:
         return "\n".join([*describe(result), *paths])
 
     interruption.settle()
-    say(form, lambda: "\n".join(map(text, run.results)), lambda: [result.as_json() for result in run.results])
+    say(
+        form,
+        lambda: "\n".join([*map(text, run.results), *totals(run)]),
+        lambda: [result.as_json() for result in run.results],
+    )
+
+
+def totals(run: Run) -> list[str]:
+    """Return the last line of several scenarios: "30 scenarios: 28 passed, 2 broken (near, far)"."""
+    from replay.batch.case import Status
+
+    ends: dict[Status, list[str]] = {}
+    for result in run.results:
+        ends.setdefault(result.status, []).append(result.name)
+    parts = []
+    for end, names in ends.items():
+        which = "" if end in (Status.PASSED, Status.INTERRUPTED) else f" ({', '.join(names)})"
+        parts.append(f"{len(names)} {end.value}{which}")
+    return [f"{len(run.results)} scenarios: {', '.join(parts)}"] if len(run.results) > 1 else []
 
 
 def exit_code(run: Run) -> ExitCode:
@@ -47,7 +65,8 @@ def report(found: Regression, *, history: Path | None) -> ExitCode:
     write_reports(found, history=history)
     click.echo("\n".join([*describe(found), f"report: {found.run.directory / INDEX}"]))
     interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
-    return worst([interrupted, *(exit_code_of(item.verdict.name) for item in found.judged)])
+    invalid = ExitCode.INVALID if any(result.invalid for result in found.run.results) else ExitCode.FINE
+    return worst([interrupted, invalid, *(exit_code_of(item.verdict.name) for item in found.judged)])
 
 
 def exit_code_of(verdict: str) -> ExitCode:

@@ -50,7 +50,7 @@ def run(
     settings = options.settings(how)
     chosen = Selection.of(scenarios, patterns, shard).chosen
     if not chosen:
-        return options.nothing(patterns)
+        return options.nothing(patterns, shard)
     with RunProgress() as watch:
         flags = {name: how[name] for name in ("overwrite", "resume")}
         done = run_all(chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **flags, **settings)

@@ -8,7 +8,7 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, nothing, say, scenarios_argument, select_option
-from replay.errors import Problem, ScenarioError
+from replay.errors import Problem, ScenarioError, count
 
 
 @click.command()
@@ -43,9 +43,8 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
             counts |= scene.counts
             kept = list(scene.notes)
             shown.extend(kept[len(remarks) :])
-        lines.append(
-            f"{scenario.name}: valid" + "".join(f", {n} {what.replace('_', ' ')}" for what, n in counts.items())
-        )
+        kinds = ((n, what.removesuffix("s").replace("_", " ")) for what, n in counts.items())
+        lines.append(", ".join([f"{scenario.name}: valid", *(count(n, kind) for n, kind in kinds)]))
         data.append({"scenario": scenario.name, **counts, "tags": list(scenario.tags), "notes": kept})
         told |= dict.fromkeys(shown)  # the cases of a sweep share their text
     for remark in told:

@@ -21,6 +21,7 @@ class Verdict(enum.Enum):
 
     SAME = "same"
     DIFFERENT = "different"
+    UNREADABLE = "unreadable"  # a recording of theirs cannot be read, so nobody knows
 
 
 class Fate(enum.Enum):

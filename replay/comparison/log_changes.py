@@ -42,6 +42,13 @@ def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
     return frozenset(equal if chunks_a and chunks_b else ())
 
 
+def same_messages(a: Path, b: Path) -> bool:
+    """Return whether two files hold the same messages in all topics, as the same bytes; errors as of `McapLog`."""
+    with McapLog(a) as log_a, McapLog(b) as log_b:
+        topics = [{channel.topic for channel in log.channels.values()} for log in (log_a, log_b)]
+        return topics[0] == topics[1] == equal_topics(log_a, log_b)
+
+
 def _chunks_by_channel(log: McapLog) -> dict[int, list[Chunk]]:
     """Return the chunks of each channel; nothing for a file that is not laid out as replay writes recordings."""
     found: dict[int, list[Chunk]] = {}

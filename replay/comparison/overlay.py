@@ -21,10 +21,13 @@ from replay.comparison.log_changes import read_scene
 from replay.comparison.plots import Curve, Curves
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, Pair, RunDifference
-from replay.recording.blueprint import TIMELINE
+from replay.recording.blueprint import SCENE, TIMELINE, eye_of, scene_view
 from replay.recording.reader import Recording, read
 from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_log import APPLICATION
+from replay.recording.rerun_scene import extent
+from replay.recording.scene_view import BodyView, SceneView
+from replay.recording.surfaces import corner_normals
 
 Color = tuple[int, int, int, int]
 
@@ -46,6 +49,33 @@ class _Mark:
     text: str
 
 
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One run: its bodies, and a recording that has its poses."""
+
+    scene: SceneView
+    poses: Recording
+
+    @staticmethod
+    def of(recording: Recording) -> _Side:
+        """Read what a pair leaves out: the scene, and poses that are equal in both."""
+        poses = recording if recording.layout.links else read(recording.path, topics=["/tf"])
+        index = {name: k for k, name in enumerate(poses.layout.links)}
+        message = read_scene(recording.path)
+        bodies = []
+        for entity in message.entities if message is not None else ():
+            for mesh in entity.triangles:
+                points = np.array([(point.x, point.y, point.z) for point in mesh.points]).reshape(-1, 3)
+                triangles = points[np.array(mesh.indices, dtype=np.int64).reshape(-1, 3)]
+                bodies.append(BodyView(entity.id, index[entity.frame_id], triangles, (0, 0, 0, 0)))
+        name = recording.provenance.scenario
+        return _Side(SceneView(name, description="", links=poses.layout.links, bodies=tuple(bodies)), poses)
+
+    def extent(self) -> NDArray[np.float64]:
+        """Return points (n, 3) [m] in world coordinates that span the scene and where it moves."""
+        return extent(self.scene, self.poses.link_poses)
+
+
 def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool = True) -> None:
     """Write the recording that shows both runs of a scenario.
 
@@ -63,18 +93,19 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
 
     file = RerunFile(path, overwrite=overwrite)
     try:
+        sides = {BASELINE: _Side.of(pair.baseline), CANDIDATE: _Side.of(pair.candidate)}
+        eye = eye_of(np.concatenate([side.extent() for side in sides.values()]))
         marks = sorted(_marks(case), key=lambda mark: mark.at.time)
         shown = case.difference.signals[:CURVES]
-        blueprint = _blueprint(marks, list(dict.fromkeys(map(_chart, shown))))
+        blueprint = _blueprint(marks, list(dict.fromkeys(map(_chart, shown))), eye)
         stream = file.open(APPLICATION, default_blueprint=blueprint)
         stream.send_recording_name(f"{case.name}: baseline and candidate")
         summary = text(RunDifference(str(case.baseline), str(case.candidate), (case,)), verbose=True)
         stream.log("summary", rr.TextDocument(summary), static=True)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        for side, recording in ((BASELINE, pair.baseline), (CANDIDATE, pair.candidate)):
-            _log_scene(stream, side, recording)
-            # a pair lacks the topics that are equal in both
-            _log_poses(stream, side, recording if recording.layout.links else read(recording.path, topics=["/tf"]))
+        for name, side in sides.items():
+            _log_scene(stream, name, side.scene)
+            _log_poses(stream, name, side.poses)
         curves = Curves(pair)
         for item in shown:
             _log_curve(stream, item, curves.curve(item), pair.baseline)
@@ -85,17 +116,16 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
         raise
 
 
-def _log_scene(stream: Any, side: str, recording: Recording) -> None:
+def _log_scene(stream: Any, side: str, scene: SceneView) -> None:
     import rerun as rr
 
-    scene = read_scene(recording.path)
-    for entity in scene.entities if scene is not None else ():
-        for mesh in entity.triangles:
-            positions = np.array([(point.x, point.y, point.z) for point in mesh.points]).reshape(-1, 3)
-            triangles = np.array(mesh.indices, dtype=np.uint32).reshape(-1, 3)
-            body = [side, "scene", entity.frame_id, entity.id.rpartition("/")[2]]
-            shape = rr.Mesh3D(vertex_positions=positions, triangle_indices=triangles, albedo_factor=COLORS[side])
-            stream.log(body, shape, static=True)
+    corners, normals = (part.reshape(-1, 3) for part in (scene.meshes.triangles, corner_normals(scene.meshes)))
+    ends = (3 * scene.meshes.first_triangle).tolist()
+    for body, begin, end in zip(scene.bodies, ends, ends[1:], strict=False):
+        path = [side, SCENE, scene.links[body.link], body.name.rpartition("/")[2]]
+        positions, across = corners[begin:end], normals[begin:end]
+        shape = rr.Mesh3D(vertex_positions=positions, vertex_normals=across, albedo_factor=COLORS[side])
+        stream.log(path, shape, static=True)
 
 
 def _log_poses(stream: Any, side: str, recording: Recording) -> None:
@@ -117,7 +147,7 @@ def _log_curve(stream: Any, item: SignalDifference, curve: Curve, baseline: Reco
     time = np.round(curve.seconds * 1e9).astype(np.int64)
     frames = np.searchsorted(baseline.time, time)
     name = item.signal.full_name
-    unit = f" [{item.signal.unit}]" if item.signal.unit else ""
+    short = " ".join(part for part in (*item.signal.topic.split("/")[2:], item.signal.name) if part)
     values = ((BASELINE, curve.baseline), (CANDIDATE, curve.candidate), (DIFFERENCE, curve.error))
     for side, column in values:
         if side != DIFFERENCE and item.signal.field == "rotation":
@@ -125,7 +155,7 @@ def _log_curve(stream: Any, item: SignalDifference, curve: Curve, baseline: Reco
         chart = _chart(item)
         path = [side, "values", chart, name] if side != DIFFERENCE else [side, chart, name]
         color = (*COLORS[side][:3], _OPAQUE) if side in COLORS else None
-        title = f"{side}: {name}{unit}" if side != DIFFERENCE else f"{name}{unit}"
+        title = f"{side}: {short}" if side != DIFFERENCE else short
         lines = rr.SeriesLines(names=title, colors=color, widths=3.0 if side == BASELINE else 1.5)
         stream.log(path, lines, static=True)
         _send(stream, path, time, frames, rr.Scalars.columns(scalars=column))
@@ -195,22 +225,18 @@ def _charts(name: str) -> Any:
     )
 
 
-def _blueprint(marks: list[_Mark], charts: list[str]) -> Any:
+def _blueprint(marks: list[_Mark], charts: list[str], eye: Any) -> Any:
     import rerun as rr
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
-    scene = rrb.Spatial3DView(
-        origin="/",
-        contents=[f"+ /{BASELINE}/scene/**", f"+ /{CANDIDATE}/scene/**"],
-        name="Baseline blue, candidate orange",
-    )
+    scene = scene_view(eye, name="Baseline blue, candidate orange", sides=[f"/{BASELINE}", f"/{CANDIDATE}"])
     moments = rrb.TextLogView(
         origin=f"/{DIFFERENCE}/moments",
         name="Moments",
         columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn(kind) for kind in ("LogLevel", "Body")]),
     )
-    below = rrb.Tabs(moments, rrb.TextDocumentView(origin="/summary", name="Summary"), active_tab=0)
+    below = rrb.Tabs(moments, rrb.TextDocumentView(origin="/summary", name="Summary"), active_tab=0 if marks else 1)
     parts = [rrb.Tabs(*map(_charts, charts), active_tab=0)] if charts else []
     selection: Any = None
     if marks:

@@ -1,4 +1,4 @@
-"""The difference as a JUnit report: a test case for each scenario, failed when it differs."""
+"""The difference as a JUnit report: a test case for each scenario, failed when it differs, an error when unreadable."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def junit(found: RunDifference) -> bytes:
     failures = len(found.different) + sum(name not in found.ignored for name, _ in alone)
     counts = {
         "name": SUITE,
-        "tests": str(len(found.cases) + len(alone)),
+        "tests": str(len(found.cases) + len(found.unreadable) + len(alone)),
         "failures": str(failures),
-        "errors": "0",
+        "errors": str(len(found.unreadable)),
         "skipped": str(len(found.ignored)),
     }
     root = ElementTree.Element("testsuites", {key: counts[key] for key in ("name", "tests", "failures", "errors")})
@@ -34,6 +34,8 @@ def junit(found: RunDifference) -> bytes:
         if case.difference.verdict is Verdict.DIFFERENT:
             message = wording.summary(case.difference)
             _child(element, "failure", _details(found, case), message=message, type="different")
+    for one in found.unreadable:
+        _child(_case(suite, one.name), "error", one.error, message=one.error, type="unreadable")
     for name, where in alone:
         element = _case(suite, name)
         if name in found.ignored:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from replay.comparison import wording
-from replay.comparison.difference import Change, Difference, SignalDifference
+from replay.comparison.difference import Change, Difference, SignalDifference, Verdict
 from replay.comparison.runs import Case, RunDifference
+from replay.errors import count
 
 SHOWN_SIGNALS = 12
 """Signals of a scenario in the short form."""
@@ -18,28 +19,27 @@ def text(found: RunDifference, *, verbose: bool = False) -> str:
 
 
 def _lines(found: RunDifference, verbose: bool) -> Iterator[str]:
-    several = len(found.cases) + len(found.missing) + len(found.extra) > 1
+    alone = [*found.missing, *found.extra]
+    several = len(found.cases) + len(found.unreadable) + len(alone) > 1
     above: tuple[Change, ...] = ()
     for case in found.cases:
         yield from _case(case, verbose, above)
         above = case.difference.provenance or above
+    yield from (f"{Verdict.UNREADABLE.value}: {one.name}: {one.error}" for one in found.unreadable)
     for where, names in (("missing in the candidate", found.missing), ("only in the candidate", found.extra)):
         for name in names:
             yield f"scenario {name}: {where}{' [ignored]' if name in found.ignored else ''}"
     if several:
-        yield (
-            f"{found.verdict.value}: {len(found.different)} of {len(found.cases)} scenarios differ, "
-            f"{len(found.missing)} missing, {len(found.extra)} extra"
-        )
+        yield f"{found.verdict.value}: {wording.totals(found)}"
 
 
 def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]:
     """Yield the lines of a scenario; `above` is the provenance that was written last."""
     found = case.difference
     yield f"{found.verdict.value}: {case.name}: {wording.summary(found)}"
-    if found.provenance:
+    repeats = found.provenance == above
+    if found.provenance and (verbose or not repeats or found.verdict is Verdict.DIFFERENT):
         decides = "decides" if found.strict_provenance else "does not decide"
-        repeats = found.provenance == above
         yield f"  provenance ({decides}){': as above' if repeats else ''}"
         if not repeats:
             yield from (f"    {wording.change(change)}" for change in found.provenance)
@@ -63,7 +63,7 @@ def _signals(found: Difference, verbose: bool) -> Iterator[str]:
         yield from (f"    {line}" for line in _details(item, found, verbose))
     hidden = len(found.deciding) - len(shown)
     if hidden > 0:
-        yield f"  and {wording.count(hidden, 'more changed signal')}; -v lists all"
+        yield f"  and {count(hidden, 'more changed signal')}; -v lists all"
 
 
 def _details(item: SignalDifference, found: Difference, verbose: bool) -> Iterator[str]:

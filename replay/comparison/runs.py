@@ -49,15 +49,26 @@ class Case:
     of_folders: bool = False
 
 
+@dataclass(frozen=True)
+class Unreadable:
+    """One scenario of two runs of which a recording cannot be read, and why."""
+
+    name: str
+    baseline: Path
+    candidate: Path
+    error: str
+
+
 @dataclass(frozen=True, eq=False)
 class RunDifference:
     """How a candidate run differs from a baseline run.
 
     Attributes:
         baseline, candidate: what was compared: files or folders, as they were named.
-        cases: the scenarios that both have.
+        cases: the scenarios that both have and that can be read.
         missing, extra: names of scenarios that only the baseline, only the candidate has.
         ignored: names among these that a rule accepts.
+        unreadable: the scenarios that both have and that cannot be read in one of them.
     """
 
     baseline: str
@@ -66,10 +77,13 @@ class RunDifference:
     missing: tuple[str, ...] = ()
     extra: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
+    unreadable: tuple[Unreadable, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
-        """Different when any scenario is, or is missing or extra without a rule."""
+        """Unreadable when any scenario is; different when any is, or is missing or extra without a rule."""
+        if self.unreadable:
+            return Verdict.UNREADABLE
         alone = any(name not in self.ignored for name in (*self.missing, *self.extra))
         differs = alone or any(case.difference.verdict is Verdict.DIFFERENT for case in self.cases)
         return Verdict.DIFFERENT if differs else Verdict.SAME
@@ -91,6 +105,10 @@ class RunDifference:
             "baseline": self.baseline,
             "candidate": self.candidate,
             "scenarios": {"missing": list(self.missing), "extra": list(self.extra), "ignored": list(self.ignored)},
+            "unreadable": [
+                {"name": o.name, "baseline": str(o.baseline), "candidate": str(o.candidate), "error": o.error}
+                for o in self.unreadable
+            ],
             "cases": cases,
         }
 
@@ -181,6 +199,8 @@ def diff_runs(
 ) -> RunDifference:
     """Return how two files, or two run folders, differ; scenarios of folders correspond by their paths inside.
 
+    A recording in a folder that cannot be read is told in the result and does not keep the others from being compared.
+
     Args:
         baseline, candidate: two MCAP files or two folders with MCAP files in them.
         rules: tolerances; without them everything must be equal.
@@ -188,8 +208,8 @@ def diff_runs(
         visit: called for each scenario while its columns are in memory, for reports that draw them.
 
     Raises:
-        InvalidValue: one is a file and the other a folder, or a folder holds no recording.
-        RecordingError: a file cannot be read or is no recording.
+        InvalidValue: one is a file and the other a folder.
+        RecordingError: one of two files cannot be read or is no recording, or a folder holds none.
     """
     rules = rules or Rules()
     folders = Path(baseline).is_dir(), Path(candidate).is_dir()
@@ -201,9 +221,15 @@ def diff_runs(
         a, b = _recordings(Path(baseline)), _recordings(Path(candidate))
     else:
         a, b = {"": Path(baseline)}, {"": Path(candidate)}
-    cases = []
+    cases, unreadable = [], []
     for name in sorted(a.keys() & b.keys()):
-        pair = read_pair(a[name], b[name], rules=rules)
+        try:
+            pair = read_pair(a[name], b[name], rules=rules)
+        except RecordingError as error:
+            if not folders[0]:
+                raise
+            unreadable.append(Unreadable(name, a[name], b[name], str(error)))
+            continue
         found = diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
         case = Case(name or found.name, a[name], b[name], found, of_folders=folders[0])
         if visit is not None:
@@ -217,6 +243,7 @@ def diff_runs(
         missing=tuple(missing),
         extra=tuple(extra),
         ignored=tuple(name for name in (*missing, *extra) if rules.tolerance(f"{SCENARIOS}/{name}").ignore),
+        unreadable=tuple(unreadable),
     )
 
 

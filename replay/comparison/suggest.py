@@ -10,6 +10,7 @@ from replay.comparison import wording
 from replay.comparison.difference import Difference, SignalDifference
 from replay.comparison.rules import EXACT, literal_pattern
 from replay.comparison.runs import RunDifference
+from replay.errors import count
 
 MARK = "REVIEW"
 """Begins the reason of every suggested rule."""
@@ -39,6 +40,7 @@ def suggest(found: RunDifference) -> str:
             rules.setdefault(tuple(_tolerance(items)), []).append(name)
     for case in found.cases:
         hopeless.extend(f"{case.name}: {line}" for line in _structure(case.difference))
+    hopeless.extend(f"scenario {one.name}: {one.error}" for one in found.unreadable)
     alone = [name for name in (*found.missing, *found.extra) if name not in found.ignored]
     hopeless.extend(f"scenario {name}: in one run only" for name in alone)
     return "\n".join([*_head(found), *_rules(rules), *_comments(hopeless)]) + "\n"
@@ -56,11 +58,11 @@ def round_up(value: float) -> str:
 
 def _beyond_tolerance(item: SignalDifference) -> Iterator[str]:
     if item.lone_events:
-        yield wording.count(item.lone_events, "event") + " in one run only"
+        yield count(item.lone_events, "event") + " in one run only"
     if item.nan:
-        yield wording.count(item.nan, "frame") + " with NaN"
+        yield count(item.nan, "frame") + " with NaN"
     if item.infinite:
-        yield wording.count(item.infinite, "frame") + " with an infinity"
+        yield count(item.infinite, "frame") + " with an infinity"
     zero = item.worst_abs is not None and item.worst_abs.error == 0.0
     if item.rule is not None and item.rule.tolerance.zero == "signed" and zero:
         yield "0.0 and -0.0 under `zero: signed`"
@@ -70,7 +72,7 @@ def _tolerance(items: list[SignalDifference]) -> Iterator[str]:
     """Yield the lines of a rule that accepts a signal; it keeps what the signal's present rule says of NaN and zero."""
     present = items[0].rule.tolerance if items[0].rule is not None else EXACT
     if items[0].event_count:
-        yield f"time: {wording.count(max(item.max_shift_frames for item in items), 'frame')}"
+        yield f"time: {count(max(item.max_shift_frames for item in items), 'frame')}"
         return
     worst = max(item.worst_abs.error for item in items if item.worst_abs is not None)
     relative = [item.worst_rel.error for item in items if item.worst_rel is not None]

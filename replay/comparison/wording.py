@@ -17,15 +17,12 @@ from replay.comparison.difference import (
     Worst,
 )
 from replay.comparison.rules import EXACT, Rule
+from replay.comparison.runs import RunDifference
 from replay.comparison.signals import ROTATION_FIELD
+from replay.errors import count
 
 SHOWN_EVENTS = 5
 """Events of a signal in the short form."""
-
-
-def count(number: int, noun: str) -> str:
-    """Return "1 frame", "2 frames"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def number(value: float, unit: str = "") -> str:
@@ -167,17 +164,25 @@ def expired(item: Rule) -> str:
     return f"expired on {item.expires.isoformat()}, no longer applies: {', '.join(item.signals)}: {item.reason.strip()}"
 
 
+def totals(found: RunDifference) -> str:
+    """Return "1 of 3 scenarios differ, 0 missing, 0 extra", and how many are unreadable if any."""
+    unreadable = f", {len(found.unreadable)} unreadable" if found.unreadable else ""
+    differ = f"{len(found.different)} of {count(len(found.cases), 'scenario')} differ"
+    return f"{differ}, {len(found.missing)} missing, {len(found.extra)} extra{unreadable}"
+
+
 def summary(found: Difference) -> str:
     """Return the difference in one line."""
     parts = []
     if found.scene:
         parts.append(f"{count(len(found.scene), 'change')} of the scene")
     if found.frames.missing or found.frames.extra:
-        parts.append(f"{count(found.frames.missing + found.frames.extra, 'frame')} in one run only")
+        ignored = "" if found.frames.decides else " (ignored)"
+        parts.append(f"{count(found.frames.missing + found.frames.extra, 'frame')} in one run only{ignored}")
     for where, items in (("missing", found.missing), ("extra", found.extra)):
-        total = sum(len(item.signals) for item in items)
-        if total:
-            parts.append(f"{count(total, 'signal')} {where}")
+        for decides, ignored in ((True, ""), (False, " (ignored)")):
+            total = sum(len(item.signals) for item in items if item.decides is decides)
+            parts += [f"{count(total, 'signal')} {where}{ignored}"] if total else []
     if found.deciding:
         parts.append(f"{len(found.deciding)} of {count(found.compared, 'signal')} changed")
     if found.accepted:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from replay.errors import count
+
 
 @dataclass(frozen=True)
 class Loss:
@@ -19,5 +21,5 @@ class Loss:
 
     def text(self, kept: int, frames: int) -> str:
         """Return it in words for a recording of which some frames were kept."""
-        saved = f"all {frames} frames were" if kept == frames else f"{kept or 'none'} of {frames} frames were"
-        return f"{self.reason}; {saved} salvaged"
+        saved = "all" if kept == frames > 1 else f"{kept or 'none'} of"
+        return f"{self.reason}; {saved} {count(frames, 'frame')} {'was' if kept == 1 else 'were'} salvaged"

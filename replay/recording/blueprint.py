@@ -27,6 +27,7 @@ _TITLES = {
 _VIEW_DIRECTION = np.array([1.1, -1.5, 0.75])
 _HALF_VIEW = np.tan(np.radians(55.0) / 2.0)  # the viewer's field of view
 _AROUND = 1.1  # room around the scene
+_NEAREST = 0.1  # [m], however small the scene
 _BACKGROUND = (38, 42, 48)
 
 
@@ -50,25 +51,25 @@ def recording(charts: Collection[str], eye: Any, axis: Any) -> Any:
     return whole(rrb.Horizontal(scene_view(eye), rrb.Vertical(*readings, below), column_shares=[3, 2]))
 
 
-def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Floats, target: Floats, end: int) -> Any:
+def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Any, end: int) -> Any:
     """Return the blueprint of several recordings in one.
 
     Args:
         sides: what the recordings are called; the entities of each stand below its name.
         charts: as of `recording`, of all together.
-        eye, target: (3,) [m], from where to where every scene is looked at.
+        eye: from where every scene is looked at, see `eye_of_all`.
         end: time [ns] at which the charts end.
     """
     import rerun as rr
     import rerun.blueprint as rrb
 
-    columns, look = [], eye_at(eye, target)
+    columns = []
     for side in sides:
         prefix = f"/{rr.escape_entity_path_part(side)}"
         curves = [chart(name, axis_until(end), prefix) for name in _TITLES if name in charts]
         below = [rrb.Tabs(*curves, active_tab=0)] if curves else []
         shares = [5, 3, 2] if curves else [5, 2]
-        columns.append(rrb.Vertical(scene_view(look, prefix, side), *below, event_table(prefix), row_shares=shares))
+        columns.append(rrb.Vertical(scene_view(eye, prefix, side), *below, event_table(prefix), row_shares=shares))
     return whole(rrb.Horizontal(*columns))
 
 
@@ -82,14 +83,33 @@ def whole(container: Any) -> Any:
 
 def eye_of(points: Floats) -> Any:
     """Return an eye that sees points (n, 3) [m] in world coordinates, in a view that is as wide as high."""
-    toward = _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION)
-    right = np.cross([0.0, 0.0, 1.0], toward) / np.hypot(*toward[:2])
-    axes = np.stack([right, np.cross(toward, right), toward])
+    axes = _view_axes()
     seen = points @ axes.T
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     aside = np.abs(seen - middle)[:, :2].max(axis=1)
     distance = float((seen[:, 2] - middle[2] + aside / _HALF_VIEW).max())
-    return eye_at(middle @ axes + (_AROUND * distance + 0.1) * toward, middle @ axes)
+    return eye_at(middle @ axes + (_AROUND * distance + _NEAREST) * axes[2], middle @ axes)
+
+
+def eye_of_all(eyes: Sequence[tuple[Floats, Floats]]) -> Any:
+    """Return one eye that sees what several eyes of `eye_of` see.
+
+    Args:
+        eyes: position and target of each, (3,) [m]; the eye of one is that one.
+    """
+    points = []
+    for position, target in eyes:
+        distance = (np.linalg.norm(position - target) - _NEAREST) / _AROUND
+        aside = max(distance, 0.0) * _HALF_VIEW * _view_axes()[:2]
+        points += [target + aside, target - aside]
+    return eye_of(np.concatenate(points))
+
+
+def _view_axes() -> Floats:
+    """Return the directions to the right, up and toward the eye, as rows."""
+    toward = _VIEW_DIRECTION / np.linalg.norm(_VIEW_DIRECTION)
+    right = np.cross([0.0, 0.0, 1.0], toward) / np.hypot(*toward[:2])
+    return np.stack([right, np.cross(toward, right), toward])
 
 
 def eye_at(position: Floats, target: Floats) -> Any:
@@ -110,13 +130,13 @@ def axis_until(end: int) -> Any:
     return rrb.TimeAxis(view_range=span)
 
 
-def scene_view(eye: Any, prefix: str = "", name: str = "Scene") -> Any:
-    """Return a view of the scene below a prefix."""
+def scene_view(eye: Any, prefix: str = "", name: str = "Scene", sides: Sequence[str] = ("",)) -> Any:
+    """Return a view of the scene below a prefix, or of the scenes of several sides below it, in one."""
     import rerun.blueprint as rrb
 
     return rrb.Spatial3DView(
         origin=prefix or "/",
-        contents=[f"+ {prefix}/{SCENE}/**"],
+        contents=[f"+ {prefix}{side}/{SCENE}/**" for side in sides],
         name=name,
         background=rrb.Background(color=_BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(255, 255, 255, 18)),

@@ -97,7 +97,7 @@ def export(
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
     if format == "json":
         return (write_file(directory / f"{stem}.json", _json(recording, chosen), overwrite=overwrite),)
-    names = _file_names(stem, chosen, format)
+    names = _file_names(stem, sorted(all_tables), format)
     encode = _csv if format == "csv" else _parquet
     return tuple(
         write_file(directory / names[topic], encode(recording, table), overwrite=overwrite)
@@ -154,13 +154,19 @@ def _vector(table: Table, name: str, unit: str, values: Column, letters: str) ->
 
 
 def _file_names(stem: str, topics: Collection[str], extension: str) -> dict[str, str]:
-    """Return a file name for each topic: letters that a path may not have are replaced, names stay different."""
+    """Return a file name for each topic: letters that a path may not have are replaced, names stay different.
+
+    They differ in more than upper and lower case, which some file systems take for the same. All topics of a recording
+    are named together, so that a topic has the same file whichever others are wanted.
+    """
     names: dict[str, str] = {}
+    taken: set[str] = set()
     for topic in topics:
         base = f"{stem}.{re.sub(r'[^A-Za-z0-9_-]+', '_', topic).strip('_')}"
         name, number = f"{base}.{extension}", 2
-        while name in names.values():
+        while name.casefold() in taken:
             name, number = f"{base}_{number}.{extension}", number + 1
+        taken.add(name.casefold())
         names[topic] = name
     return names
 

@@ -73,7 +73,7 @@ class RerunWriter:
         if self._stream is None:
             self.prepare()
         if self._blocks == 0:
-            self._corners = extent(self._scene, block.link_poses[0])
+            self._corners = extent(self._scene, block.link_poses)
         self._end = int(block.time[-1])
         self._indexes.clear()
         self._poses(block)

@@ -28,6 +28,7 @@ CURVES = (
 )
 """Colours of curves, told apart on a dark ground."""
 
+_FRAMES = 17  # that the first picture has room for: the motion between two of them is small
 _CORNERS = np.array([[[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]], dtype=np.bool_)
 
 
@@ -77,11 +78,11 @@ def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:
 
 
 def extent(scene: SceneView, link_poses: Floats) -> Floats:
-    """Return points (n, 3) [m] in world coordinates that span the scene.
+    """Return points (n, 3) [m] in world coordinates that span the scene and where it moves.
 
     Args:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
-        link_poses: (L, 4, 4), T_world_link in one frame.
+        link_poses: (F, L, 4, 4), T_world_link; at most 17 of the frames are looked at, evenly spread.
     """
     spans = [(cone.link, cone.T_link_sensor[:3, 3][None]) for cone in scene.cones]
     spans += [(plate.link, plate_corners(plate)) for plate in scene.plates]
@@ -96,7 +97,11 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         spans += [(bodies[k].link, boxes[k]) for k in np.flatnonzero(solid if solid.any() else ~solid).tolist()]
     if not spans:
         return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
-    return np.concatenate([transforms.apply(link_poses[link], points) for link, points in spans])
+    links = np.repeat([link for link, _ in spans], [len(points) for _, points in spans])
+    frames = np.linspace(0, len(link_poses) - 1, min(len(link_poses), _FRAMES)).astype(np.int64)
+    return transforms.apply(
+        link_poses[frames[:, None], links], np.concatenate([points for _, points in spans])
+    ).reshape(-1, 3)
 
 
 def _mesh(corners: Floats, normals: Floats, color: Color | None) -> list[Column]:

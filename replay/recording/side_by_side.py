@@ -18,6 +18,7 @@ from replay.recording.scene_view import Floats
 
 _CHARTS = (blueprint.DISTANCE, blueprint.CAPACITIVE, blueprint.CLEARANCE, blueprint.JOINTS)
 _EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
+_SOMEWHERE = np.array([3.0, -4.0, 3.0]), np.zeros(3)  # where recordings that are not ours are looked at from
 
 
 def side_names(files: Sequence[Path]) -> list[str]:
@@ -73,9 +74,8 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
                 found.look_from(reader)
                 for chunk in reader.stream():
                     _copy(stream, chunk, side, found)
-        stream.send_blueprint(
-            blueprint.side_by_side(sides, sorted(found.charts), found.eye, found.target, found.end), make_active=False
-        )
+        eye = blueprint.eye_of_all(found.eyes or [_SOMEWHERE])
+        stream.send_blueprint(blueprint.side_by_side(sides, sorted(found.charts), eye, found.end), make_active=False)
         result.commit()
     except BaseException:
         result.discard()
@@ -99,24 +99,22 @@ def _readable(file: Path) -> Iterator[Any]:
 
 
 class _Found:
-    """What the recordings have: charts, their end [ns], and from where the first one looks at its scene."""
+    """What the recordings have: charts, their end [ns], and from where to where each looks at its scene."""
 
     def __init__(self) -> None:
         self.charts: set[str] = set()
         self.end = 0
-        self.eye: Floats = np.array([3.0, -4.0, 3.0])
-        self.target: Floats = np.zeros(3)
-        self._looked = False
+        self.eyes: list[tuple[Floats, Floats]] = []
 
     def look_from(self, reader: Any) -> None:
-        """Take the first recording's eye, so that all scenes are seen from one place."""
-        for store in () if self._looked else reader.blueprints():
+        """Take a recording's eye."""
+        for store in reader.blueprints():
             for chunk in reader.stream(store=store):
                 names = chunk.to_record_batch().schema.names
                 if all(name in names for name in _EYE):
                     batch = chunk.to_record_batch()
-                    eye, target = (batch.column(name).to_pylist()[-1][0] for name in _EYE)
-                    self.eye, self.target, self._looked = np.array(eye), np.array(target), True
+                    eye, target = (np.array(batch.column(name).to_pylist()[-1][0]) for name in _EYE)
+                    self.eyes.append((eye, target))
 
 
 def _copy(stream: Any, chunk: Any, side: str, found: _Found) -> None:

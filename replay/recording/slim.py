@@ -33,7 +33,7 @@ def write_slim(recording: Path, target: Path, objects: Path) -> tuple[str, ...]:
     Args:
         recording: a whole recording.
         target: the slim one; replaced when it exists.
-        objects: folder for the meshes; one that is there already stays.
+        objects: folder for the meshes; one that is there already stays, unless it is damaged.
 
     Returns:
         The digests of the meshes that the recording needs.
@@ -93,8 +93,9 @@ def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
 
 def _put(data: bytes, objects: Path) -> str:
     digest = sha256(data)
-    if not (objects / digest).is_file():
-        write_file(objects / digest, data)
+    place = objects / digest
+    if not place.is_file() or place.read_bytes() != data:
+        write_file(place, data)
     return digest
 
 

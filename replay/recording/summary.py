@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from replay.errors import count
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import Provenance
@@ -57,7 +58,7 @@ class Summary:
         """Return the summary as lines for people."""
         made, width = self.provenance, max(len(topic.topic) for topic in self.topics)
         lines = [
-            f"{self.path}: {made.scenario}, {self.frames} frames, {self.seconds:g} s, {self.bytes} bytes",
+            f"{self.path}: {made.scenario}, {count(self.frames, 'frame')}, {self.seconds:g} s, {self.bytes} bytes",
             "topics",
             *(f"  {topic.topic:<{width}}  {topic.messages:>7}  {topic.schema}" for topic in self.topics),
             "provenance",
@@ -65,7 +66,10 @@ class Summary:
             "  model " + ", ".join(f"{key} {value}" for key, value in sorted(made.model.items())),
             "  libraries " + ", ".join(f"{name} {version}" for name, version in sorted(made.libraries.items())),
             "files",
-            *(f"  {digest[:16]}  {self.files.get(name, 0):>9}  {name}" for name, digest in sorted(made.files.items())),
+            *(
+                f"  {sha[:16]}  {self.files.get(name, 'elsewhere'):>9}  {name}"
+                for name, sha in sorted(made.files.items())
+            ),
         ]
         return "\n".join(lines)
 

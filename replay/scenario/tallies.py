@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.errors import count
 from replay.scenario.expectations import When
 
 Times = NDArray[np.int64]
@@ -47,7 +48,7 @@ class Count:
 
     def result(self, what: str) -> tuple[bool, str]:
         """See `Tally`."""
-        text = f"{what} in {self.count} of {self.frames} frames"
+        text = f"{what} in {self.count} of {count(self.frames, 'frame')}"
         if self.when == "always":
             text += "" if self.first_not is None else f", first not at {shown_seconds(self.first_not)}"
             return self.count == self.frames, text
@@ -116,7 +117,7 @@ class Extremes:
             parts.append(f"no {what}")
         unknown = self.complete and self.missing > 0
         if unknown:
-            parts.append(f"{what} not computed in {self.missing} frames (model.collision.clearance)")
+            parts.append(f"{what} not computed in {count(self.missing, 'frame')} (model.collision.clearance)")
         above = self.low is None or self.least[0] >= self.low
         below = self.high is None or self.most[0] <= self.high
         return above and below and not unknown, ", ".join(parts)

@@ -13,6 +13,7 @@ from replay.comparison.runs import diff
 from replay.errors import RecordingError
 from replay.geometry import primitives
 from replay.recording.slim import attached_files
+from replay.recording.summary import summarize
 
 NOW = datetime.datetime(2027, 3, 1, 2, 0, tzinfo=datetime.UTC)
 TEXT = """
@@ -52,6 +53,7 @@ def test_slim_recordings_share_their_meshes_and_say_all_that_the_whole_ones_do(r
     assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
     slim, whole = baseline.recording("a"), run / "a" / "a.mcap"
     assert slim.stat().st_size < whole.stat().st_size - mesh.stat().st_size
+    assert "  elsewhere  ball.stl" in summarize(slim).as_text()
     found = diff(slim, whole)
     assert found.verdict.value == "same"
     assert not found.provenance
@@ -89,6 +91,9 @@ def test_nothing_changes_when_one_of_them_cannot_be_stored(run, tmp_path):
             {**entries(run, "a"), "b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW
         )
     assert not (tmp_path / "new").exists()
+    with pytest.raises(RecordingError):  # no mesh was written by then
+        Baseline(tmp_path / "new").store({"b": Entry(tmp_path / "cut.mcap", "new")}, reason="x", now=NOW)
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
@@ -98,6 +103,8 @@ def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
     mesh.write_bytes(b"x")
     with pytest.raises(RecordingError, match="SHA-256 is not its name"):
         attached_files(baseline.recording("a"))
+    baseline.store(entries(run, "a"), reason="again", now=NOW)
+    assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
     mesh.unlink()
     with pytest.raises(RecordingError, match="neither attached nor in a folder 'objects'"):
         attached_files(baseline.recording("a"))

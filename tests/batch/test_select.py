@@ -52,3 +52,13 @@ def test_problems_of_all_files_are_listed_together_and_names_are_unique(folder):
     assert "'near' is taken by" in text
     assert "rate" in text
     assert len(caught.value.problems) == 2
+
+
+def test_a_mistake_in_a_part_that_several_include_is_said_once(folder):
+    (folder / "parts" / "table.yaml").write_text("links: {table: {size: 1}}\n")
+    for name in ("near", "far"):
+        text = SCENARIO.format(name=name, tags="") + "include: [parts/table.yaml]\n"
+        (folder / f"{name}.yaml").write_text(text)
+    with pytest.raises(ScenarioError) as refused:
+        load_all([folder / "near.yaml", folder / "far.yaml"])
+    assert str(refused.value).count("links.table.size: unknown key") == 1

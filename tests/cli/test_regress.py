@@ -127,6 +127,66 @@ def test_filters_missing_and_unused_baselines(tmp_path, capsys):
     assert night(tmp_path, out, "--select", "tag:none") is ExitCode.NOTHING
 
 
+def test_one_scenario_with_a_mistake_does_not_cost_the_night(tmp_path, capsys):
+    prepare(tmp_path, plain=3, bad=0, differing=0)
+    wrong = tmp_path / "in" / "plain_1.yaml"
+    wrong.write_text("version: 1\nname: plain_1 # of three\nrate: fast\nduration: 1\nlinks: {}\n")
+    out = tmp_path / "out"
+    capsys.readouterr()
+    assert night(tmp_path, out) is ExitCode.INVALID
+    said = capsys.readouterr().out
+    assert f"plain_1: failed: {wrong}:3:7: rate = 'fast'" in said
+    assert "unused" not in said
+    assert verdicts_of(out) == {"plain_0": "same", "plain_1": "failed", "plain_2": "same"}
+    assert junit_of(out) == {"plain_0": "pass", "plain_1": "error", "plain_2": "pass"}
+    assert "rate = &#39;fast&#39;" in (out / "index.html").read_text()
+    assert run(["accept", str(out), "--baseline", str(tmp_path / "base"), "--yes"]) is ExitCode.INVALID
+    assert "plain_1 (failed)" in capsys.readouterr().err
+    assert night(tmp_path, out, "--select", "plain_0") is ExitCode.FINE  # not asked for
+    assert night(tmp_path, out, "--select", "plain_1") is ExitCode.INVALID  # nothing else asked for
+    assert night(tmp_path, out, "--shard", "2/2") is ExitCode.FINE  # told in the first part
+    assert night(tmp_path, out, "--shard", "1/2", "--select", "tag:quick") is ExitCode.INVALID
+    (tmp_path / "in" / "other.yaml").write_text("version: 1\nname: [\n")  # named by its file then
+    assert night(tmp_path, out, "--select", "*er") is ExitCode.INVALID
+    assert night(tmp_path, out, "--select", "other", "--select", "plain_2") is ExitCode.INVALID
+    assert verdicts_of(out)["other"] == "failed"
+
+
+def test_a_renamed_scenario_is_told_by_its_readings(tmp_path, capsys):
+    prepare(tmp_path, plain=2, bad=0, differing=0)
+    (tmp_path / "in" / "plain_1.yaml").unlink()
+    scenes.write(tmp_path / "in", "new_name")
+    scenes.write(tmp_path / "in", "another", distance=1.25)
+    capsys.readouterr()
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert "new_name: missing baseline" in said and "unused baseline plain_1 has exactly the same" in said
+    assert said.count("renamed?") == 1
+    assert "1 unused baseline, of no scenario given: plain_1; delete the folder of what is gone" in said
+
+
+def test_one_file_is_compared_with_its_own_baseline_alone(tmp_path, capsys):
+    prepare(tmp_path, plain=2, bad=0, differing=0)
+    capsys.readouterr()
+    base = ["--baseline", str(tmp_path / "base"), "-o", str(tmp_path / "out")]
+    assert run(["regress", str(tmp_path / "in" / "plain_0.yaml"), *base]) is ExitCode.FINE
+    assert "unused" not in capsys.readouterr().out
+
+
+def test_a_damaged_baseline_is_replaced_by_accepting(tmp_path, capsys):
+    prepare(tmp_path, plain=3, bad=0, differing=0)
+    for name in ("plain_0", "plain_1"):
+        damaged = tmp_path / "base" / name / f"{name}.mcap"
+        damaged.write_bytes(damaged.read_bytes()[:-100])
+    out = tmp_path / "out"
+    assert night(tmp_path, out, "--select", "plain_[02]") is ExitCode.INVALID
+    assert verdicts_of(out) == {"plain_0": "unreadable baseline", "plain_1": "skipped", "plain_2": "same"}
+    capsys.readouterr()
+    assert run(["accept", str(out), "--baseline", str(tmp_path / "base"), "--yes", "--reason", "mended"]) == 0
+    assert "plain_0: replaces a baseline that cannot be read: damaged: its end" in capsys.readouterr().out
+    assert night(tmp_path, out, "--select", "plain_[02]") is ExitCode.FINE
+
+
 def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     scenes.write(tmp_path / "in", "a")
     scenes.write(tmp_path / "in", "b")

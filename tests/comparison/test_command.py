@@ -1,6 +1,7 @@
 """`replay diff`: what it prints and writes, and its exit code."""
 
 import json
+import shutil
 from xml.etree import ElementTree
 
 import pytest
@@ -51,6 +52,26 @@ def test_the_command_says_what_it_cannot_read(folders, tmp_path, run):
     code, _, err = run(good, good, "--rules", tmp_path / "rules.yaml")
     assert (code, "rules.yaml:2:18: rules[0].signal = 'x'" in err) == (2, True)
     assert run(good)[0] == 2
+
+
+def test_a_damaged_recording_is_told_and_the_others_are_compared(folders, tmp_path, run):
+    shutil.copytree(folders / "b", tmp_path / "b")
+    damaged = tmp_path / "b" / "same" / "same.mcap"
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    code, out, _ = run(folders / "a", tmp_path / "b", "--html", tmp_path / "d.html", "--junit", tmp_path / "d.xml")
+    assert code == 2
+    assert out.startswith("different: other: ")
+    assert f"unreadable: same: {damaged}: damaged: its end" in out
+    assert out.endswith("unreadable: 1 of 1 scenario differ, 1 missing, 1 extra, 1 unreadable\n")
+    assert "its end is missing" in (tmp_path / "d.html").read_text(encoding="utf-8")
+    tags = {
+        case.get("name"): [child.tag for child in case]
+        for case in ElementTree.parse(tmp_path / "d.xml").iter("testcase")
+    }
+    assert tags == {"other": ["failure"], "same": ["error"], "gone": ["failure"], "new": ["failure"]}
+    code, out, _ = run(folders / "a", tmp_path / "b", "--format", "json")
+    assert (code, json.loads(out)["verdict"]) == (2, "unreadable")
+    assert "its end is missing" in run(folders / "a", tmp_path / "b", "--suggest-rules")[1]
 
 
 def test_the_command_applies_rules(folders, tmp_path, run):

@@ -1,5 +1,6 @@
 """A difference as text, JSON, JUnit, HTML and a rerun overlay."""
 
+import dataclasses
 import json
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,6 +20,7 @@ from replay.comparison.report_junit import junit
 from replay.comparison.report_text import text
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.runs import Case, Pair, RunDifference, diff_pair, diff_runs
+from replay.comparison.wording import summary
 from replay.errors import InvalidValue, RecordingError, WriteError
 from tests.comparison import made_up
 from tests.comparison.changed import BASELINE, CANDIDATE, compared
@@ -83,6 +85,33 @@ def test_text_tells_the_provenance_of_a_night_once():
         1,
         1,
     ]
+
+
+def test_what_rules_accept_is_called_ignored_in_the_line_of_a_scenario():
+    shorter = dataclasses.replace(made_up.only_frames(BASELINE, np.arange(99)), collision=None)
+    accepted = Rules((Rule(("/collision/*", "/frames"), Tolerance(ignore=True), "known"),))
+    assert summary(diff_pair(Pair(BASELINE, shorter), rules=accepted)) == (
+        "1 frame in one run only (ignored), 8 signals missing (ignored)"
+    )
+    assert summary(diff_pair(Pair(BASELINE, shorter), rules=None)) == "1 frame in one run only, 8 signals missing"
+
+
+def test_what_differs_is_not_lost_among_what_is_the_same():
+    numpy = made_up.with_provenance(BASELINE, libraries={**BASELINE.provenance.libraries, "numpy": "9.9"})
+    same = [
+        Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(Pair(BASELINE, numpy), rules=None)) for name in ("a", "b")
+    ]
+    (different,) = compared(name="c")[0].cases
+    found = RunDifference("a", "b", (*same, different))
+    assert [line for line in text(found).splitlines() if "provenance" in line] == [
+        "same: a: 1 difference of provenance",
+        "  provenance (does not decide)",
+        "same: b: 1 difference of provenance",
+        "different: c: 1 change of the scene, 6 of 55 signals changed, 1 difference of provenance",
+        "  provenance (does not decide): as above",
+    ]
+    page = html(found, {})
+    assert page.index("<code>c</code>") < page.index("<code>a</code>") < page.index("<code>b</code>")
 
 
 def test_json_holds_all_of_it_and_is_json():
@@ -204,6 +233,9 @@ def test_the_overlay_shows_both_runs_and_the_moments(folders, tmp_path):
                 columns[str(chunk.entity_path), name.rpartition(":")[2]] = column.to_pylist()
     entities = {entity for entity, _ in columns}
     assert {"/baseline/scene/arm/beam", "/candidate/scene/arm/beam", "/summary"} <= entities
+    assert columns["/baseline/scene/arm/beam", "vertex_normals"]  # without them the viewer draws no shades
+    names = [v for (entity, kind), v in columns.items() if kind == "names" and entity.endswith(r"right\/distance")]
+    assert sorted(names) == [[["baseline: right"]], [["candidate: right"]], [["right"]]]
     assert columns["/baseline/scene/arm/beam", "albedo_factor"] != columns["/candidate/scene/arm/beam", "albedo_factor"]
     errors = next(v for (entity, kind), v in columns.items() if "right" in entity and entity.startswith("/difference"))
     assert len(errors) == 100

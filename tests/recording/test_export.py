@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
 
@@ -96,3 +97,13 @@ def test_what_cannot_be_exported_is_said(recording: Recording, tmp_path: Path) -
     with pytest.raises(RecordingExistsError):
         export(recording, tmp_path, format="json")
     export(recording, tmp_path, format="json", overwrite=True)
+
+
+def test_a_topic_has_its_own_file_whichever_others_are_wanted(recording: Recording, tmp_path: Path) -> None:
+    layout = dataclasses.replace(recording.layout, distance_sensors=("Tip.1", "tip_1"))
+    provenance = dataclasses.replace(recording.provenance, layout=layout)
+    alike = dataclasses.replace(recording, provenance=provenance)
+    paths = export(alike, tmp_path, format="csv", topics=["/distance/*"])
+    assert [path.name for path in paths] == ["made_up.distance_Tip_1.csv", "made_up.distance_tip_1_2.csv"]
+    (alone,) = export(alike, tmp_path, format="csv", topics=["/distance/tip_1"], overwrite=True)
+    assert alone == paths[1]

@@ -6,6 +6,7 @@ import dataclasses
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
-from replay.recording.blueprint import eye_of
+from replay.recording.blueprint import eye_of, eye_of_all
 from replay.recording.picture import _cause, picture, viewer_binary
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
@@ -150,13 +151,13 @@ def test_normals_are_those_of_every_corner_against_every_other() -> None:
 
 def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     scene = moving.scene()
-    poses = next(moving.blocks(FRAMES)).link_poses[40]
+    poses = next(moving.blocks(FRAMES)).link_poses[[0, 40, 80]]
     sheet = np.array([[[-9.0, -9, 0], [9, -9, 0], [9, 9, 0]]])
     floor = BodyView("room/floor", 1, sheet, (0, 0, 0, 255))
     nothing = BodyView("room/nothing", 1, np.zeros((0, 3, 3)), (0, 0, 0, 255))
-    placed = [transforms.apply(poses[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies]
-    apexes = [(poses[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones]
-    corners = [transforms.apply(poses[plate.link], plate_corners(plate)) for plate in scene.plates]
+    placed = [transforms.apply(T[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies for T in poses]
+    apexes = [(T[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones for T in poses]
+    corners = [transforms.apply(T[plate.link], plate_corners(plate)) for plate in scene.plates for T in poses]
     bare = dataclasses.replace(scene, cones=(), plates=())
     for view, bodies, points in (
         (scene, (floor, *scene.bodies, nothing), [*placed, *apexes, *corners]),
@@ -167,6 +168,17 @@ def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     ):
         shown, wanted = extent(dataclasses.replace(view, bodies=bodies), poses), np.concatenate(points)
         assert np.allclose([shown.min(axis=0), shown.max(axis=0)], [wanted.min(axis=0), wanted.max(axis=0)])
+
+
+def test_one_eye_sees_what_several_see() -> None:
+    def place(eye: Any) -> Any:
+        return tuple(np.array(part.as_arrow_array().to_pylist()[0]) for part in (eye.position, eye.look_target))
+
+    near, far = np.eye(3), np.eye(3) * 5.0 + [20.0, 0.0, 0.0]
+    one, other, both = (place(eye_of(points)) for points in (near, far, np.concatenate([near, far])))
+    assert np.allclose(place(eye_of_all([one, one])), one, atol=1e-6)
+    eye, target = place(eye_of_all([one, other]))
+    assert np.linalg.norm(eye - target) >= np.linalg.norm(both[0] - both[1])
 
 
 @pytest.mark.parametrize("size", [(12.0, 0.2, 0.2), (0.2, 0.2, 8.0), (1.0, 2.0, 3.0), (0.3, 0.3, 0.01)])
