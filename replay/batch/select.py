@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -144,9 +145,9 @@ class Selection:
         skipped = {s.name: "not selected" for s in everything if s.name not in names[0]}
         skipped |= {s.name: "in another shard" for s in matching if s.name not in names[1]}
         sources = {scenario.name: path for scenario, path in loaded}
-        named = {_name_in(path, sources): path for path in wrong}
-        if len(named) < len(wrong):
-            _refuse(wrong)
+        named: dict[str, Path] = {}
+        for path in wrong:
+            named[_name_in(path, sources.keys() | named)] = path
         mine = shard is None or shard.index == 1
         named = {name: path for name, path in named.items() if mine and (not patterns or _any_matches(name, patterns))}
         invalid = {name: wrong[path] for name, path in named.items()}
@@ -157,10 +158,11 @@ class Selection:
 
 
 def _name_in(path: Path, taken: Collection[str]) -> str:
-    """Return the name that a file which is not valid gives its scenario; that of the file when there is none."""
+    """Return the name that a file which is not valid gives its scenario; that of the file when it is none or taken."""
     found = _NAME_KEY.search(path.read_bytes())
-    name = found[1].decode() if found else path.stem
-    return path.stem if name in taken else name
+    numbered = (f"{path.stem}_{number}" for number in itertools.count(2))
+    names = itertools.chain([found[1].decode()] if found else [], [path.stem], numbered)
+    return next(name for name in names if name not in taken)
 
 
 def _any_matches(name: str, patterns: Sequence[str]) -> bool:

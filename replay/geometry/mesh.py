@@ -86,6 +86,9 @@ def solid_from_triangles(triangles: Array) -> Solid:
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
     faces = corner_indices(triangles)
     again = repeated(faces) & ~flat
+    given, left = topology(faces), topology(faces[~again])
+    if given.open_edges == 0 and given < left:
+        again[:] = False  # closed bodies that share a face: each of them needs its own
     repeats = int(np.count_nonzero(again))
     if repeats:
         notes.append(f"{repeats} of {len(triangles)} triangles repeat another one and were dropped")

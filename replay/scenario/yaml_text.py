@@ -29,8 +29,8 @@ MAX_NODES: Final = 200_000
 MAX_DIGITS: Final = 400
 """Characters of one number."""
 
-_KEPT_BYTES: Final = 64 << 10  # of one file; what is longer is seldom shared, and its tree is large
-_KEPT_FILES: Final = 64
+_KEPT_BYTES: Final = 16 << 10  # of one file; what is longer is seldom shared, and its tree is large
+_KEPT_FILES: Final = 32
 
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")

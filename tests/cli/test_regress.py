@@ -152,6 +152,18 @@ def test_one_scenario_with_a_mistake_does_not_cost_the_night(tmp_path, capsys):
     assert verdicts_of(out)["other"] == "failed"
 
 
+def test_mistakes_with_names_that_are_taken_have_names_of_their_own(tmp_path, capsys):
+    prepare(tmp_path, plain=2, bad=0, differing=0)
+    wrong = "version: 1\nname: plain_0\nrate: fast\n"
+    for folder in ("first", "second"):
+        (tmp_path / "in" / folder).mkdir()
+        (tmp_path / "in" / folder / "plain_0.yaml").write_text(wrong)
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.INVALID
+    failed = dict.fromkeys(("plain_0_2", "plain_0_3"), "failed")
+    assert verdicts_of(tmp_path / "out") == {"plain_0": "same", "plain_1": "same", **failed}
+    capsys.readouterr()
+
+
 def test_a_renamed_scenario_is_told_by_its_readings(tmp_path, capsys):
     prepare(tmp_path, plain=2, bad=0, differing=0)
     (tmp_path / "in" / "plain_1.yaml").unlink()

@@ -100,6 +100,15 @@ def test_repeated_triangles_count_once() -> None:
     assert len(solid_from_triangles(sheet).triangles) == 4
 
 
+def test_closed_bodies_that_share_a_face_keep_both() -> None:
+    # one less, and three triangles met at each of its edges: the mesh had no inside
+    low, high = primitives.cuboid((1.0, 1.0, 1.0)).triangles, primitives.cuboid((1.0, 1.0, 2.0)).triangles
+    pair = solid_from_triangles(np.concatenate([low + np.array([0.0, 0.0, 0.5]), high + np.array([0.0, 0.0, 1.0])]))
+    assert pair.watertight and len(pair.triangles) == 24 and pair.volume == pytest.approx(3.0)
+    twice = solid_from_triangles(np.concatenate([low, low]))
+    assert twice.watertight and len(twice.triangles) == 12
+
+
 def test_winding_is_repaired() -> None:
     rng = np.random.default_rng(2)
     ring = primitives.arc(0.8, 2 * np.pi, 0.2, 0.1, 1e-3)

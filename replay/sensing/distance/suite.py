@@ -80,7 +80,7 @@ class DistanceSuite:
         count: number of rays, 1 or more; used by "rays" only.
         engine: "own" or "embree" (float32, needs the package embreex); used by "rays" only.
         savings: False looks at every triangle in every frame, and takes nothing from the frame before; the readings are
-            the same bit for bit (tests/test_savings.py).
+            the same bit for bit (tests/test_savings.py); of "rays", but where a ray all but lies in a triangle's plane.
 
     An apex on a face of a target reads 0 with it, whichever way the sensor looks, as far as poses are known: to 8
     epsilon of the way from the sensor over the links to the face (methods "exact", and "rays" with engine "own").
