@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -244,11 +244,11 @@ def _send(ready: _Ready, path: Path) -> Path:
 
 def _beside(ready: _Ready, path: Path, scene: Scene, blocks: Sequence[FrameBlock], folder: Path) -> Path:
     """Write both files at once, each in a thread, the log from blocks that are there."""
-    library = threading.Thread(target=_send, args=(ready, path))
-    library.start()
-    record_blocks(scene, blocks, folder, rrd=False, overwrite=True)
-    library.join()
-    return path
+    path.unlink(missing_ok=True)
+    with ThreadPoolExecutor(1) as library:
+        sent = library.submit(_send, ready, path)
+        record_blocks(scene, blocks, folder, rrd=False, overwrite=True)
+        return sent.result()
 
 
 def _judge_copy(ready: _Ready, path: Path) -> Check:

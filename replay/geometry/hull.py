@@ -41,7 +41,10 @@ def convex_hull(points: Array) -> Hull | None:
 
 
 def extreme_points(points: Array) -> Array:
-    """Return those of finite points (n, 3) that are vertices of their hull, in their order; of flat points all."""
+    """Return those of finite points (n, 3) that are vertices of their hull, in their order; of flat points all.
+
+    Accuracy: as of `convex_hull`.
+    """
     hull = _qhull(to_unit_box(points)[0])
     return points if hull is None else points[_vertices(hull)]
 
