@@ -1,8 +1,8 @@
 """Worker processes that survive their tasks: a task may crash, hang or eat memory, and the others go on.
 
 Workers are fresh interpreters, not forks, so that no state of this process reaches a result. They live long: kernels
-are loaded once a worker and not once a task. The first one prepares itself alone, so that kernels are compiled once;
-no time limit counts before a worker is ready.
+are loaded once a worker and not once a task. The first one prepares itself alone, unless it says that others can share
+the work of it; no time limit counts before a worker is ready.
 """
 
 from __future__ import annotations
@@ -26,7 +26,19 @@ from typing import Any, TypeVar
 
 import psutil
 
-from replay.batch.worker import Advanced, Finished, Order, Prepare, Raised, Ready, Start, Told, Work
+from replay.batch.worker import (
+    Advanced,
+    Divisible,
+    Finished,
+    Order,
+    Prepare,
+    Preparing,
+    Raised,
+    Ready,
+    Start,
+    Told,
+    Work,
+)
 from replay.errors import InvalidValue, WorkerError
 
 T = TypeVar("T")
@@ -93,8 +105,10 @@ class Pool:
         timeout: longest time of one task [s]; None for none.
         memory: most resident memory of one task with its child processes [bytes]; None for any.
         prepare: called in each worker before its first task.
+        helpers: most workers that prepare themselves at the same time; as many as `workers` if None.
         follow: called with the name of a task, what is done of it and all of it; (name, 0, 0) when it begins.
         tell: called with remarks for the user.
+        preparing: called with how far the preparation of workers is.
         check: called all the time, at least about ten times a second; what it raises ends the run and all processes.
 
     Raises:
@@ -109,8 +123,10 @@ class Pool:
         timeout: float | None = None,
         memory: int | None = None,
         prepare: Prepare | None = None,
+        helpers: int | None = None,
         follow: Callable[[str, int, int], None] = lambda name, done, total: None,
         tell: Callable[[str], None] = lambda text: None,
+        preparing: Callable[[Any], None] = lambda state: None,
         check: Callable[[], None] = lambda: None,
     ) -> None:
         for name, value in (("workers", workers), ("timeout", timeout), ("memory", memory)):
@@ -118,10 +134,12 @@ class Pool:
                 raise InvalidValue(name, value, "must be above 0")
         self._start = Start(work, prepare)
         self._count = workers
+        self._helpers = helpers or workers
         self._timeout = timeout
         self._memory = memory
         self._follow = follow
         self._tell = tell
+        self._preparing = preparing
         self._check = check
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
@@ -134,14 +152,19 @@ class Pool:
         inbox: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
         workers: list[_Worker] = []
         prepared = False
+        preparing = 1
         failed_starts = 0
         next_check = 0.0
         try:
             while waiting or any(worker.task for worker in workers):
                 self._check()
                 wanted = min(self._count, len(waiting) + sum(worker.task is not None for worker in workers))
-                while len(workers) < (wanted if prepared else 1):
+                while len(workers) < (wanted if prepared else preparing):
                     workers.append(_Worker(self._start, inbox))
+                spare = [worker for worker in workers if worker.task is None] if prepared else []
+                for worker in sorted(spare, key=lambda worker: worker.ready)[: max(0, len(workers) - wanted)]:
+                    workers.remove(worker)
+                    worker.stop()
                 for worker in workers:
                     if worker.ready and worker.task is None and waiting:
                         worker.give(waiting.popleft())
@@ -153,6 +176,10 @@ class Pool:
                     match message:
                         case Told(text):
                             self._tell(text)
+                        case Preparing(state):
+                            self._preparing(state)
+                        case Divisible():
+                            preparing = self._helpers
                         case Ready():
                             worker.ready = prepared = True
                             failed_starts = 0

@@ -190,12 +190,14 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
         "follow": watch.follow,
         "check": watch.check,
     }
+    cores = execution.workers or os.cpu_count() or 1
     if execution.dask is not None:
         from replay.batch.cluster import Cluster
 
         yield from Cluster(execution.dask, run_case, **limits).run(tasks)
     else:
-        yield from Pool(run_case, workers=workers, tell=watch.tell, **limits).run(tasks)
+        pool = Pool(run_case, workers=workers, helpers=cores, tell=watch.tell, preparing=watch.prepare, **limits)
+        yield from pool.run(tasks)
 
 
 def _reused(

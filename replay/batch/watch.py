@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from replay.batch.case import CaseResult
+from replay.numerics.compiling import Compiling
 
 
 class Watch(Protocol):
@@ -12,6 +13,9 @@ class Watch(Protocol):
 
     def plan(self, costs: dict[str, float]) -> None:
         """Take what is going to run: names with expected costs."""
+
+    def prepare(self, state: Compiling) -> None:
+        """Take how far kernels are compiled."""
 
     def follow(self, name: str, done: int, total: int) -> None:
         """Take how many frames of a scenario are done; (name, 0, 0) when it begins."""
@@ -33,6 +37,9 @@ class Unwatched:
     """Nobody follows."""
 
     def plan(self, costs: dict[str, float]) -> None:
+        """Do nothing."""
+
+    def prepare(self, state: Compiling) -> None:
         """Do nothing."""
 
     def follow(self, name: str, done: int, total: int) -> None:

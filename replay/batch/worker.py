@@ -24,8 +24,8 @@ Follow = Callable[[int, int], None]
 """Called with what is done of a task and all of it."""
 Work = Callable[[Any, Follow], Any]
 """What a worker does with the payload of a task."""
-Prepare = Callable[[Callable[[str], None]], None]
-"""What a worker does before its first task; called with what tells the user something."""
+Prepare = Callable[["Messages"], None]
+"""What a worker does before its first task; called with what tells the pool something."""
 
 _SECONDS_BETWEEN_MESSAGES = 0.2
 
@@ -51,6 +51,18 @@ class Told:
     """A remark for the user while the worker prepares itself."""
 
     text: str
+
+
+@dataclass(frozen=True)
+class Preparing:
+    """How far the preparation is."""
+
+    state: Any
+
+
+@dataclass(frozen=True)
+class Divisible:
+    """The preparation takes a while, and is done sooner where several workers prepare themselves at once."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +92,25 @@ class Raised:
     text: str
 
 
+class Messages:
+    """What a worker can tell the pool while it prepares itself."""
+
+    def __init__(self, answer: Callable[[object], None]) -> None:
+        self._answer = answer
+
+    def tell(self, text: str) -> None:
+        """Tell the user something."""
+        self._answer(Told(text))
+
+    def progress(self, state: object) -> None:
+        """Tell how far it is."""
+        self._answer(Preparing(state))
+
+    def share(self) -> None:
+        """Ask for other workers that prepare themselves at the same time."""
+        self._answer(Divisible())
+
+
 def main() -> None:
     """Work until the pool closes the connection; it does so too when it dies."""
     orders, answers = _channels()
@@ -87,14 +118,17 @@ def main() -> None:
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(orders, inbox), name="replay-orders", daemon=True).start()
 
+    writing = threading.Lock()  # the progress of the preparation comes from a thread of its own
+
     def answer(message: object) -> None:
-        answers.write(pickle.dumps(message))
-        answers.flush()
+        with writing:
+            answers.write(pickle.dumps(message))
+            answers.flush()
 
     start: Start = inbox.get()
     if start.prepare is not None:
         try:
-            start.prepare(lambda text: answer(Told(text)))
+            start.prepare(Messages(answer))
         except Exception as error:  # a task that has the same trouble will say so itself
             answer(Told(f"a worker could not prepare itself: {error!r}"))
     answer(Ready())

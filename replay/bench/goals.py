@@ -76,6 +76,7 @@ PROMISES: dict[str, Promise] = {
     "start.help": _at_most("replay --help", "-", 0.4, "s"),
     "start.validate": _at_most("replay validate", "-", 1.0, "s"),
     "start.modules": _at_most("replay validate, of numba, rerun, trimesh loaded", "-", 0.0),
+    "cold.kernels": Promise("compiling carm_bodyguard's kernels, CPU", "numba's public decorator", 2.0),
     "savings.same": _at_most("values that differ beyond their bound without savings", "the same run with", 0.0),
     "stability": _at_most("hard families: wrong, NaN, refused, hangs, crashes of ours", "long precision", 0.0),
 }

@@ -1,4 +1,4 @@
-"""How long commands take to start, each in a fresh process, and what they load that they do not need."""
+"""How long commands take to start, and the first run of all, each in a fresh process; what they load needlessly."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import time
 from collections.abc import Sequence
 from importlib import resources
 
+from replay.bench import cold
 from replay.bench.goals import Goal
 from replay.bench.report import Grid, Report
 from replay.bench.shipped import FOLDER
@@ -30,7 +31,7 @@ def run(*, quick: bool = False, rounds: int | None = None) -> Report:
     """Run the benchmark.
 
     Args:
-        quick: fewer rounds; about ten seconds.
+        quick: fewer rounds, and of the first run two scenes; about a minute.
         rounds: 7, or 3 when quick, if None.
     """
     report = Report("start")
@@ -63,6 +64,7 @@ def run(*, quick: bool = False, rounds: int | None = None) -> Report:
     report.goals.append(
         Goal("start.modules", float(len({*loaded["replay validate"], *loaded["replay --help"]} & {*PROMISED})))
     )
+    cold.measure(report, quick=quick)
     return report
 
 

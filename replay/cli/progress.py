@@ -10,9 +10,12 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from replay.cli import interruption
+from replay.numerics.compiling import Compiling
 
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
+
+_SECONDS_BETWEEN_LINES = 5.0
 
 
 class RunProgress:
@@ -28,6 +31,9 @@ class RunProgress:
         self._done = self._failed = 0
         self._cost_done = 0.0
         self._begin: float | None = None
+        self._kernels: TaskID | None = None
+        self._compiling: Compiling | None = None
+        self._next_line = 0.0
 
     def __enter__(self) -> RunProgress:
         self._bars.start()
@@ -42,10 +48,29 @@ class RunProgress:
         self._costs = costs
         self._bars.update(self._all, total=len(costs))
 
+    def prepare(self, state: Compiling) -> None:
+        """Show how far kernels are compiled; several workers tell, and what is done does not become less."""
+        interruption.check()
+        known = self._compiling or state
+        self._compiling = Compiling(max(known.done, state.done), known.total, max(known.seconds, state.seconds))
+        if self._console.is_terminal:
+            if self._kernels is None:
+                self._kernels = self._bars.add_task("compiling kernels", total=known.total)
+            self._bars.update(self._kernels, completed=self._compiling.done)
+        elif time.monotonic() >= self._next_line:
+            self._next_line = time.monotonic() + _SECONDS_BETWEEN_LINES
+            self.tell(str(self._compiling))
+
     def follow(self, name: str, done: int, total: int) -> None:
         """Show how far a running scenario is."""
         interruption.check()
         self._begin = self._begin or time.monotonic()  # kernels are ready now
+        if self._compiling is not None:
+            self.tell(str(Compiling(self._compiling.total, self._compiling.total, self._compiling.seconds, ended=True)))
+            self._compiling = None
+        if self._kernels is not None:
+            self._bars.remove_task(self._kernels)
+            self._kernels = None
         if name not in self._running:
             self._running[name] = self._bars.add_task(f"  {escape(name)}", total=None)
         if total:

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
 from replay.collision.pairs import CollisionBody
-from replay.collision.support import Sets, make_sets
+from replay.collision.support import SETS_TYPE, Sets, make_sets
 from replay.errors import InvalidValue
 from replay.geometry.bounds import fit_aabb, fit_obb, fit_sphere
 from replay.geometry.convex import ConvexSets, convex_sets
-from replay.geometry.tree import Tree
+from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.jit import record
 from replay.numerics.rows import distinct_rows
 
 Floats = NDArray[np.float64]
@@ -44,6 +46,9 @@ class Volumes(NamedTuple):
     radius: Floats  # (B,) [m]
 
 
+VOLUMES_TYPE = record(Volumes, int64, float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[::1])
+
+
 class Bodies(NamedTuple):
     """B bodies as unions of convex sets under box trees, concatenated; tree entries count from each body's own start.
 
@@ -61,6 +66,21 @@ class Bodies(NamedTuple):
     reach: Floats  # (B,) [m], largest distance of a vertex from the link's origin
     probes: Floats  # (p, 3) [m]
     probe_first: Integers  # (B + 1,)
+
+
+BODIES_TYPE = record(
+    Bodies,
+    SETS_TYPE,
+    int64[::1],
+    TREE_TYPE,
+    int64[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+    boolean[::1],
+    float64[::1],
+    float64[:, ::1],
+    int64[::1],
+)
 
 
 def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:

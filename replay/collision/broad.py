@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.collision.bodies import AABB, SPHERE, Volumes
-from replay.collision.pair_frames import REPEAT, RUN, SKIP, PairFrames
+from replay.collision.bodies import AABB, SPHERE, VOLUMES_TYPE, Volumes
+from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, SKIP, PairFrames
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
-from replay.numerics.jit import inlined_kernel, leaf_kernel
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -97,6 +98,7 @@ def volumes_meet(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, s
     return aabbs_meet(center_a, half_a, center_b, half_b, scratch[:4])
 
 
+@entry(VOLUMES_TYPE, PAIR_FRAMES_TYPE, float64, int64[::1], float64[:, ::1], float64[:, ::1])
 @leaf_kernel
 def sieve(
     volumes: Volumes, frames: PairFrames, limit: float, counts: Integers, spreads: Floats, scratch: Floats
@@ -144,6 +146,7 @@ def sieve(
                 counts[BY_VOLUME] += 1
 
 
+@entry(VOLUMES_TYPE, PAIR_FRAMES_TYPE, float64[:, ::1])
 @leaf_kernel
 def keep_all(volumes: Volumes, frames: PairFrames, scratch: Floats) -> None:
     """Fill level as `sieve` does, and task with RUN: no pair and frame is left out. Arguments as of `sieve`."""

@@ -16,12 +16,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
 from replay.collision.bodies import Volumes
-from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
+from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.kinematics.linkage import LinkPoses
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,6 +50,7 @@ def near_pairs(volumes: Volumes, links: Integers, poses: LinkPoses, limit: float
     return found
 
 
+@entry(float64[:, :, :, ::1])
 @leaf_kernel
 def _extremes(world: Floats) -> tuple[float, float]:
     """Return the largest |coordinate| of any link [m], and the largest |R^T R - I| of any rotation."""
@@ -67,6 +69,17 @@ def _extremes(world: Floats) -> tuple[float, float]:
     return largest, math.sqrt(defect)
 
 
+@entry(
+    float64[:, :, :, ::1],
+    int64[::1],
+    float64[:, ::1],
+    float64[::1],
+    float64,
+    float64,
+    float64,
+    float64[:, ::1],
+    float64[:, ::1],
+)
 @leaf_kernel
 def _sweep(
     world: Floats,
@@ -94,6 +107,7 @@ def _sweep(
             lower[body, i], upper[body, i] = low - reach, high + reach
 
 
+@entry(TREE_TYPE, float64[:, ::1], float64[:, ::1], int64[::1], int64[:, ::1])
 @kernel
 def _meeting(tree: Tree, lower: Floats, upper: Floats, stack: Integers, found: Integers) -> int:
     """Return how many pairs of boxes meet, and write them to `found` if it has room; `stack` is scratch."""

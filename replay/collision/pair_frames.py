@@ -5,7 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import boolean, float64, int64, uint8
 from numpy.typing import NDArray
+
+from replay.numerics.jit import record
 
 SKIP, RUN, REPEAT = 0, 1, 2
 """What the narrow phase has to do for a pair in a frame: nothing, look, or copy the frame before."""
@@ -31,6 +34,18 @@ class PairFrames(NamedTuple):
     level: NDArray[np.uint8]
     clearance: NDArray[np.float64]
     undecided: NDArray[np.bool_]
+
+
+PAIR_FRAMES_TYPE = record(
+    PairFrames,
+    int64[:, ::1],
+    float64[:, :, :, ::1],
+    float64[:, :, :, ::1],
+    uint8[:, ::1],
+    uint8[:, ::1],
+    float64[:, ::1],
+    boolean[:, ::1],
+)
 
 
 def unanswered(pairs: NDArray[np.int64], poses: NDArray[np.float64], turns: NDArray[np.float64]) -> PairFrames:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from functools import partial
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision import broad, narrow
+from replay.collision import broad, candidates, narrow, relative, scan, support, traversal
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
 from replay.collision.columns import CollisionColumns, CollisionEntries
@@ -25,7 +26,9 @@ from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.relative import RelativePoses
 from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
+from replay.geometry import box_search, calipers, decomposition, principal_axes, smallest_ball, tree
 from replay.kinematics.linkage import Linkage, LinkPoses
+from replay.numerics.jit import entries_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,6 +41,15 @@ PAIRS_AT_ONCE = 16_384
 
 FEW_PAIRS = 512
 """Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
+
+
+def kernels(*, bounds: Bounds, narrowphase: str, pieces: Pieces, savings: bool = True) -> tuple[Any, ...]:
+    """Return the kernels that a pipeline with these options calls; see `CollisionPipeline`."""
+    used = [tree, support, relative, candidates]
+    used += {"sphere": [smallest_ball], "aabb": []}.get(bounds, [principal_axes, box_search, calipers])
+    used += [decomposition] if pieces == "convex" else []
+    used += [traversal] if narrowphase == "fcl" else [narrow if savings else scan]
+    return (*entries_of(*used), broad.sieve if savings else broad.keep_all)
 
 
 class NarrowPhase(Protocol):
@@ -281,7 +293,4 @@ def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings:
 
         return FclEngine(bodies, arrays)
 
-    def decide(frames: PairFrames, limit: float, counts: Integers) -> None:
-        narrow.decide(arrays, frames, limit, counts, savings)
-
-    return decide
+    return partial(narrow.decide if savings else scan.decide_without_savings, arrays)

@@ -7,10 +7,11 @@ way k is its parent's way times the link's own pose. A pair then costs one inver
 from __future__ import annotations
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
 from replay.kinematics.linkage import Linkage
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import entry, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -69,6 +70,15 @@ def _rows(wanted: Integers, keys: Integers, order: Integers) -> Integers:
     return np.where(wanted < 0, -1, found)
 
 
+@entry(
+    float64[:, :, :, ::1],
+    int64[:, ::1],
+    int64[:, ::1],
+    float64[:, :, :, ::1],
+    float64[:, ::1],
+    float64[:, ::1],
+    float64[:, :, :, ::1],
+)
 @leaf_kernel
 def _relative(
     local: Floats, ways: Integers, pairs: Integers, table: Floats, identity: Floats, inverse: Floats, result: Floats

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.collision.bodies import Bodies
-from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, SEPARATED, STEPS, UNDECIDED, Workspace
+from replay.collision.bodies import BODIES_TYPE, Bodies
+from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, SEPARATED, STEPS, UNDECIDED, Workspace, workspace
 from replay.collision.gjk_kernel import ROUNDING, query
+from replay.collision.narrow import SEEN_INSIDE, hold_each_other, is_asked_for, write_found
+from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.traversal import IN_DOUBLE_DOUBLE, ITERATIONS, QUERIES
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,3 +52,22 @@ def closest_of_all(
     if undecided:
         return UNDECIDED, 0.0
     return SEPARATED, best if found else np.inf
+
+
+@entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, int64[::1])
+@kernel
+def decide_without_savings(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -> None:
+    """Do as `narrow.decide`, by every convex set of one body against all of the other, from no earlier answer."""
+    work = workspace()
+    rotation, translation = np.empty((3, 3)), np.empty(3)
+    for p in range(len(frames.pairs)):
+        for f in range(frames.task.shape[0]):
+            if is_asked_for(frames, f, p, rotation, translation):
+                a, b = frames.pairs[p, 0], frames.pairs[p, 1]
+                status, distance = closest_of_all(bodies, a, b, rotation, translation, limit, work, counts)
+                # surfaces that are apart may still hold each other, where their volumes meet
+                held = status == SEPARATED and frames.level[f, p] > 0 and (bodies.surface[a] or bodies.surface[b])
+                if held and hold_each_other(bodies, a, b, rotation, translation):
+                    status, distance = CONTACT, 0.0
+                    counts[SEEN_INSIDE] += 1
+                write_found(frames, f, p, status, distance, limit, counts)

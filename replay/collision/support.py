@@ -14,9 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.numerics.jit import inlined_kernel, kernel
+from replay.numerics.jit import entry, inlined_kernel, kernel, record
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -43,6 +44,20 @@ class Sets(NamedTuple):
     margin: Floats  # (m,) [m] what a cell leaves out is lower by, per |x| + |y| + |z| of the direction
     cells: Integers  # (c,) rows of `candidates`
     candidates: Integers  # (t,)
+
+
+SETS_TYPE = record(
+    Sets,
+    float64[:, ::1],
+    float64[::1],
+    int64[::1],
+    float64[:, ::1],
+    int64[::1],
+    int64[::1],
+    float64[::1],
+    int64[::1],
+    int64[::1],
+)
 
 
 def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets:
@@ -92,6 +107,7 @@ def _table(flat: Floats, begin: int, end: int, margin: float) -> tuple[Integers,
     return starts, listed
 
 
+@entry(float64[::1], int64, float64, int64[::1], int64[::1], int64[::1], int64[::1])
 @kernel
 def _list_cells(
     flat: Floats, side: int, margin: float, starts: Integers, listed: Integers, finer: Integers, found: Integers

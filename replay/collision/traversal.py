@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
-from replay.collision.bodies import Bodies
+from replay.collision.bodies import BODIES_TYPE, Bodies
 from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, LOWER, SEPARATED, STEPS, UNDECIDED, Workspace
 from replay.collision.gjk_kernel import ROUNDING, query
 from replay.geometry.containment import inside
 from replay.geometry.tree import MAX_DEPTH, Tree
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -166,6 +167,7 @@ def _larger(half: Floats, i: int, j: int) -> bool:
     return larger
 
 
+@entry(BODIES_TYPE, int64, int64, float64[:, ::1], float64[::1], boolean)
 @kernel
 def contains_part(bodies: Bodies, a: int, b: int, rotation: Floats, translation: Floats, from_b: bool) -> bool:
     """Return whether body a's closed surface holds a connected part of b, the surfaces being apart.

@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
 from replay.geometry.calipers import turn_about
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def box_volume(points: Array, axes: Array) -> float:
     return volume
 
 
+@entry(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1], int64, float64)
 @kernel
 def smallest_box(points: Array, axes: Array, trials: Array, starts: Array, kept: int, floor: float) -> Array:
     """Return the axes (3, 3 rows) of the smallest box found around points; never a larger one than along `axes`.

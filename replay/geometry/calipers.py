@@ -9,15 +9,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
 _NOISE = 1e-14  # of points of extent 1: edges shorter than this have no direction
 
 
+@entry(float64[:, ::1], float64[::1], float64[:, ::1])
 @kernel
 def turn_about(points: Array, axis: Array, axes: Array) -> float:
     """Write the axes of the smallest box that has a side along a unit axis, and return its volume.

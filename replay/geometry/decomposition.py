@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numba import boolean, float64
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
@@ -24,8 +25,8 @@ from replay.geometry.closest import nearest_triangle, squared_distance_to_triang
 from replay.geometry.containment import inside
 from replay.geometry.hull import convex_hull, to_unit_box
 from replay.geometry.solid import Solid, signed_volume
-from replay.geometry.tree import Tree, triangle_tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
+from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
@@ -131,6 +132,7 @@ def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
     return float(outside.max())
 
 
+@entry(float64[:, :, ::1], float64[:, :, ::1], TREE_TYPE, boolean, float64)
 @kernel
 def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, slack: float) -> float:
     """Return the largest distance of a point of faces outside the body, at most slack below the true one.

@@ -6,15 +6,16 @@ import math
 from pathlib import Path
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MeshError
 from replay.geometry.hull import extreme_points, to_unit_box
 from replay.geometry.mesh_file import read_faces
 from replay.geometry.solid import Solid, signed_volume
-from replay.geometry.tree import MAX_DEPTH, Tree, build_tree
+from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.geometry.winding import corner_indices, repeated, topology, wound_against_neighbours
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
 
 Array = NDArray[np.float64]
@@ -139,6 +140,7 @@ def _is_convex(triangles: Array) -> bool:
     return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
 
 
+@entry(float64[:, :, ::1], float64[:, ::1], TREE_TYPE, float64)
 @kernel
 def _all_below(triangles: Array, points: Array, tree: Tree, slack: float) -> bool:
     """Return whether no point is further than slack outside the plane of any triangle (all of some area).

@@ -11,15 +11,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
 _SWEEPS = 30  # a 3x3 matrix needs about 5
 
 
+@entry(float64[:, ::1])
 @kernel
 def covariance_of_points(points: Array) -> Array:
     """Return the covariance (3, 3) [m^2] of points (n, 3) about their mean."""
@@ -36,6 +38,7 @@ def covariance_of_points(points: Array) -> Array:
     return result
 
 
+@entry(float64[:, :, ::1])
 @kernel
 def covariance_of_triangles(triangles: Array) -> tuple[float, Array]:
     """Return (area [m^2], covariance (3, 3) [m^2]) of the surface triangles (n, 3, 3); zeros for no area."""
@@ -69,6 +72,7 @@ def covariance_of_triangles(triangles: Array) -> tuple[float, Array]:
     return total, result
 
 
+@entry(float64[:, ::1])
 @kernel
 def eigen(matrix: Array) -> tuple[Array, Array]:
     """Return (values (3,) ascending, vectors (3, 3) in rows) of a symmetric matrix, by Jacobi's rotations.

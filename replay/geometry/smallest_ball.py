@@ -10,15 +10,17 @@ that a badly conditioned subset cannot win.
 from __future__ import annotations
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
 _MOST_PIVOTS = 1000  # about 10 are needed; rounding cannot make it run longer than this
 
 
+@entry(float64[:, ::1])
 @kernel
 def smallest_ball_centre(points: Array) -> Array:
     """Return the centre (3,) of the smallest ball around points (n, 3), n >= 1, of extent about 1 about the origin."""

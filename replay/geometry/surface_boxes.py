@@ -16,11 +16,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
 from replay.geometry.principal_axes import eigen
-from replay.geometry.tree import Tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.jit import entry, kernel
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -126,6 +127,7 @@ def _measure(triangles: Floats, origin: Floats, axes: Floats, low: Floats, high:
         low[i], high[i] = least, most
 
 
+@entry(TREE_TYPE, float64[:, :, ::1], int64[::1], float64[::1])
 @kernel
 def fit_boxes(tree: Tree, triangles: Floats, nodes: Ints, middle: Floats) -> Singles:
     """Return the boxes (k, BOX) [m] of k nodes of a binary tree, their centres seen from `middle`.

@@ -12,10 +12,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel, record
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,6 +45,9 @@ class Tree(NamedTuple):
     begin: Ints  # (m,)
     end: Ints  # (m,)
     order: Ints  # (n,)
+
+
+TREE_TYPE = record(Tree, float64[:, ::1], float64[:, ::1], int64[::1], int64[::1], int64[::1], int64[::1])
 
 
 def build_tree(lower: Floats, upper: Floats, *, leaf_size: int = 4) -> Tree:
@@ -183,6 +187,7 @@ def _partition(
     return middle
 
 
+@entry(float64[:, ::1], float64[:, ::1], float64[:, ::1], int64, int64[::1], int64[::1], float64[:, ::1], int64[:, ::1])
 @kernel
 def _build(
     lower: Floats,

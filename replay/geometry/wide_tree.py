@@ -11,11 +11,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import float32, float64, int32, int64
 from numpy.typing import NDArray
 
 from replay.geometry.surface_boxes import BOX, HALVES, fit_boxes
-from replay.geometry.tree import MAX_DEPTH, Tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.jit import entry, kernel, record
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -45,6 +46,11 @@ class WideTree(NamedTuple):
     farthest: Floats  # (3,) largest absolute coordinates of the body [m]
 
 
+WIDE_TREE_TYPE = record(
+    WideTree, float32[:, ::1], int32[:, ::1], float64[:, ::1], int32[:, ::1], float64[::1], float64[::1]
+)
+
+
 def widen(tree: Tree, triangles: Floats) -> WideTree:
     """Return the wide tree over triangles; equal input gives the equal tree.
 
@@ -71,6 +77,7 @@ def widen(tree: Tree, triangles: Floats) -> WideTree:
     )
 
 
+@entry(TREE_TYPE)
 @kernel
 def _collapse(tree: Tree) -> tuple[Ints, ShortInts, Ints]:
     """Return members (r, LANES) of the nodes as nodes of the binary tree or -1, children, and leaves (l,) likewise."""
@@ -110,6 +117,7 @@ def _collapse(tree: Tree) -> tuple[Ints, ShortInts, Ints]:
     return members[:nodes].copy(), children[:nodes].copy(), leaves[:leaf_count].copy()
 
 
+@entry(TREE_TYPE, float64[:, :, ::1], int64[::1])
 @kernel
 def _pack(tree: Tree, triangles: Floats, leaves: Ints) -> tuple[Floats, ShortInts]:
     """Return the corners and indices of the leaves; triangles in the order of the tree."""

@@ -9,10 +9,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import float32, float64, int64
 from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH, Tree
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel, record
 from replay.sensing.capacitive.moments import DEGREE, add_moments, add_triangle_moments, move_moments
 from replay.sensing.capacitive.triangle_sum import triangle_areas
 
@@ -73,6 +74,11 @@ class Clusters(NamedTuple):
     blur: float  # [m]
     moments: Floats  # (m, 40) [m^2, m^3, m^4], means over the area about the centroid
     links: Ints  # (m, 4) of the tree: second child, or -1, first triangle and one beyond the last
+
+
+CLUSTERS_TYPE = record(
+    Clusters, float64[:, ::1], float64[:, ::1], float32[:, ::1], float64, float64[:, ::1], int64[:, ::1]
+)
 
 
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
@@ -141,6 +147,16 @@ def _largest_variance(second: Floats) -> Floats:
     return result
 
 
+@entry(
+    float64[:, :, ::1],
+    float64[::1],
+    float64[:, ::1],
+    int64[::1],
+    int64[::1],
+    int64[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+)
 @kernel
 def _gather(
     triangles: Floats,
@@ -223,6 +239,7 @@ def _multinomial(i: int, j: int, k: int) -> float:
     return result
 
 
+@entry(float64[:, :, ::1], float64[::1], int64[::1], int64[::1], float64[:, ::1])
 @kernel
 def _enclose(triangles: Floats, areas: Floats, begin: Ints, end: Ints, nodes: Floats) -> None:
     """Write radii, cones of normals and the planes' offsets of all nodes."""

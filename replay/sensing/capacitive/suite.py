@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.geometry import tree
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float
+from replay.numerics.jit import entries_of
+from replay.sensing.capacitive import clusters
 from replay.sensing.capacitive.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.divider import output_voltage
@@ -30,6 +34,12 @@ _LARGEST_EXPONENT = 500
 
 SMALLEST_RTOL = 1e-12
 """Below it the tolerance would be lost in the rounding of a sum of many triangles."""
+
+
+def kernels(*, method: str, savings: bool = True) -> tuple[Any, ...]:
+    """Return the kernels that a suite with these options calls; see `CapacitiveSuite`."""
+    own = (*entries_of(clusters), sum_tree) if method == "tree" and savings else (sum_triangles,)
+    return (*entries_of(tree), triangle_areas, *own)
 
 
 class CapacitiveSuite:

@@ -39,12 +39,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.sensing.capacitive.budget import Tally, budget_of
-from replay.sensing.capacitive.clusters import Clusters
+from replay.sensing.capacitive.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.hard_triangles import sum_exactly, sum_hard
 from replay.sensing.capacitive.lanes import LANES
 from replay.sensing.capacitive.opening import refine
@@ -65,6 +66,7 @@ NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 by one; triangles behind the plate or facing away, left out node by node, are the rest."""
 
 
+@entry(CLUSTERS_TYPE, float64[:, :, :, ::1], float64[::1], float64[:, ::1], boolean, boolean, float64, int64[::1])
 @kernel
 def sum_tree(
     clusters: Clusters,

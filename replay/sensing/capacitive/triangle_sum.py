@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.exact_sign import area_or_zero
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
 from replay.sensing.capacitive.midpoint import midpoint_over_triangle
@@ -20,6 +21,7 @@ EXACT = -1
 """As `splits`: the closed forms instead of the midpoint rule."""
 
 
+@entry(float64[:, :, ::1])
 @kernel
 def triangle_areas(triangles: Floats) -> Floats:
     """Return the areas (n,) [m^2] of triangles (n, 3, 3) [m]."""
@@ -29,6 +31,7 @@ def triangle_areas(triangles: Floats) -> Floats:
     return result
 
 
+@entry(float64[:, :, ::1], float64[::1], float64[:, :, :, ::1], float64[::1], float64[:, ::1], boolean, boolean, int64)
 @kernel
 def sum_triangles(
     triangles: Floats,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.geometry.wide_tree import LANES, MAX_WAITING, WideTree
-from replay.numerics.jit import kernel
+from replay.geometry.wide_tree import LANES, MAX_WAITING, WIDE_TREE_TYPE, WideTree
+from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import Cone
 from replay.sensing.distance.query import COMPUTED, LOOKED_AT, REPEATED, closest_in_tree, closest_of_all
-from replay.sensing.distance.readings import Nearest
+from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,18 @@ def axis_of(pose: Array) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
+@entry(
+    float64[:, :, ::1],
+    WIDE_TREE_TYPE,
+    float64[:, :, ::1],
+    float64,
+    float64,
+    float64[::1],
+    float64,
+    int64,
+    NEAREST_TYPE,
+    int64[::1],
+)
 @kernel
 def sweep_exact(
     triangles: Array,
@@ -91,6 +104,17 @@ def sweep_exact(
             nearest.case[i] = case
 
 
+@entry(
+    float64[:, :, ::1],
+    float64[:, :, ::1],
+    float64,
+    float64,
+    float64[::1],
+    float64,
+    int64,
+    NEAREST_TYPE,
+    int64[::1],
+)
 @kernel
 def sweep_scan(
     triangles: Array,

@@ -13,14 +13,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.geometry.tree import MAX_DEPTH, Tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import EPSILON
 from replay.sensing.distance.exact import same_pose
 from replay.sensing.distance.query import SLACK
-from replay.sensing.distance.readings import Nearest
+from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 from replay.sensing.distance.vectors import Vector, accurate_cross, cross, dot, norm, subtract
 
 Array = NDArray[np.float64]
@@ -130,6 +131,7 @@ def _nearest_hit(
     return best, triangle
 
 
+@entry(float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1], float64[:, ::1], float64[::1], float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_rays(
     triangles: Array,

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import float64, int32, uint8
 from numpy.typing import NDArray
 
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
+from replay.numerics.jit import record
 from replay.sensing.columns import Detection, DistanceColumns
 from replay.sensing.target import Target
 
@@ -33,6 +35,9 @@ class Nearest(NamedTuple):
         return Nearest(
             self.distance[frames], self.offset[frames], self.target[frames], self.triangle[frames], self.case[frames]
         )
+
+
+NEAREST_TYPE = record(Nearest, float64[::1], float64[:, ::1], int32[::1], int32[::1], uint8[::1])
 
 
 def nothing_yet(frames: int) -> Nearest:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.geometry import surface_boxes, tree, wide_tree
 from replay.geometry.tree import triangle_tree
 from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
+from replay.numerics.jit import entries_of
 from replay.sensing.columns import DistanceColumns
 from replay.sensing.distance.closest import check_aperture, check_range
 from replay.sensing.distance.cone import half_angle
@@ -31,6 +34,15 @@ Sweep = Callable[["DistanceSensor", int, Array, Array, Nearest], None]
 
 METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
+
+
+def kernels(*, method: str, engine: str, savings: bool = True) -> tuple[Any, ...]:
+    """Return the kernels that a suite with these options calls; see `DistanceSuite`."""
+    if method == "exact":
+        return (*entries_of(tree, surface_boxes, wide_tree), sweep_exact if savings else sweep_scan)
+    if method == "thesis":
+        return (*entries_of(tree), sweep_thesis)
+    return (*entries_of(tree), *((sweep_rays,) if engine == "own" else ()))
 
 
 @dataclass(frozen=True, eq=False)

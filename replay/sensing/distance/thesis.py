@@ -27,12 +27,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, EPSILON, FOOT, NOTHING
 from replay.sensing.distance.exact import axis_of, same_pose
-from replay.sensing.distance.readings import Nearest
+from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
 
 Array = NDArray[np.float64]
@@ -111,6 +112,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
     return best, point, case
 
 
+@entry(float64[:, :, ::1], float64[:, :, ::1], float64, float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_thesis(
     triangles: Array, T_target_sensor: Array, cos_half: float, reach: float, target: int, nearest: Nearest

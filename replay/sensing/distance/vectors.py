@@ -36,7 +36,7 @@ def _hardware_fma(_typing: Any, x: Any, y: Any, z: Any) -> Any:
 @overload(fma)
 def _compiled_fma(x: Any, y: Any, z: Any) -> Any:
     def fused(x: Any, y: Any, z: Any) -> Any:
-        return _hardware_fma(x, y, z)  # type: ignore[call-arg]
+        return _hardware_fma(x, y, z)
 
     return fused
 

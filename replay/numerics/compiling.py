@@ -1,0 +1,26 @@
+"""How far the compiling of kernels is, as users are told it; apart from `jit`, since telling it needs no numba."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Compiling:
+    """How far it is.
+
+    Attributes:
+        done, total: kernels compiled, and all that are wanted.
+        seconds: since the first of them was begun.
+        ended: nothing is left to compile for now.
+    """
+
+    done: int
+    total: int
+    seconds: float
+    ended: bool = False
+
+    def __str__(self) -> str:
+        if self.ended:
+            return f"compiled {self.done} kernel{'s' * (self.done != 1)} in {self.seconds:.1f} s; they are kept"
+        return f"compiling kernels: {self.done} of {self.total}, {self.seconds:.0f} s"

@@ -1,0 +1,288 @@
+"""All that reaches into numba: kernels are lowered one by one, and optimised once, in those that Python calls.
+
+numba makes of every function that it compiles a module that is optimised, turned into machine code, given two wrappers
+for callers outside, and kept in a file; then it takes the module into each caller and does all of it again. Of these
+kernels few are ever called from outside. Here a function that a kernel calls ends as LLVM code (`KernelLibrary`). When
+Python calls a kernel, the code of all that it reaches is linked into one module, which gets the one wrapper it needs,
+is optimised once, and is kept under the kernel's key (`reach`, `store`). The arithmetic is the same: with this
+package's policy LLVM reorders and contracts nothing.
+
+Besides, while kernels are compiled: Python's garbage collection rests (what it looks through is all in use); constants
+among arguments do not make specialisations; the types of operators on numbers are looked for once; and numba's option
+sets compare without rebuilding their defaults.
+
+None of this is public in numba, so it holds for the versions it was tried with, `TRIED`. With another version, or when
+a name that it needs is gone, `AVAILABLE` is false and kernels are compiled by numba's public decorator, only slower.
+When a version is added: run the tests, `replay bench start` and `replay bench --quick` with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import operator
+import pickle
+from collections.abc import Iterator
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+from numba import types
+from numba.core import event
+
+from replay.numerics.jit import progress, store
+from replay.numerics.jit.reach import key_of, name_of, reached
+
+TRIED = ("0.68.",)
+"""Beginnings of the versions of numba whose inner side is known."""
+
+_NEEDED: tuple[tuple[Any, tuple[str, ...]], ...] = ()
+try:
+    from numba.core import serialize, sigutils, typing
+    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+    from numba.core.compiler import CompileResult
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.environment import lookup_environment
+    from numba.core.registry import CPUDispatcher, cpu_target
+    from numba.core.targetconfig import TargetConfig
+
+    _NEEDED = (
+        (JITCodeLibrary, ("_unserialize", "_finalize_final_module", "_finalize_dynamic_globals", "add_llvm_module")),
+        (JITCPUCodegen, ("set_env", "_module_pass_manager", "_library_class")),
+        (CPUDispatcher, ("compile", "add_overload", "get_call_template", "get_overload")),
+        (CompileResult, ("_reduce", "_rebuild", "_replace")),
+        (TargetConfig, ("__hash__", "__eq__", "options")),
+        (serialize, ("dumps",)),
+        (sigutils, ("normalize_signature",)),
+        (types.Function, ("get_call_type",)),
+    )
+except ImportError:  # another numba: see the module's text
+    CPUDispatcher: Any = object  # type: ignore[no-redef]
+    JITCodeLibrary: Any = object  # type: ignore[no-redef]
+
+AVAILABLE = (
+    numba.__version__.startswith(TRIED)
+    and bool(_NEEDED)
+    and all(hasattr(place, name) for place, names in _NEEDED for name in names)
+)
+"""Whether this numba is one whose inner side is known."""
+
+
+_NUMBERS = (types.Float, types.Integer, types.Boolean) if AVAILABLE else ()
+_known_operators: dict[Any, tuple[Any, Any]] = {}
+
+
+class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """The LLVM code of one function; what it calls is in the libraries it links, until `emit` puts all into one."""
+
+    _emitted = False
+    _shared_module: Any
+
+    def add_llvm_module(self, module: Any) -> None:
+        """Take in code as it is."""
+        module.data_layout = self._codegen._data_layout
+        self._final_module.link_in(module)
+
+    def finalize(self) -> None:
+        """Take nothing in any more; nothing is optimised yet."""
+        self._raise_if_finalized()
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return a function's address, 0 if it has none."""
+        address: int = super().get_pointer_to_function(name) if self._emitted else 0
+        return address
+
+    def emit(self) -> None:
+        """Link all that is reached, optimise it, and make machine code."""
+        self._link_reached(self._final_module)
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
+        self._final_module.verify()
+        self._finalize_final_module()
+        self._emitted = True
+        for variable in self._final_module.global_variables:
+            environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
+            if environment is not None and not variable.is_declaration:
+                JITCPUCodegen.set_env(self._codegen, variable.name, environment)
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Return machine code and, in place of code for other functions to take in, the names of what it defines."""
+        names = (f'define void @"{function.name}"() {{ ret void }}' for function in self.get_defined_functions())
+        return self.name, "object", (self._get_compiled_object(), llvm.parse_assembly("\n".join(names)).as_bitcode())
+
+    def _link_reached(self, module: Any) -> None:
+        """Put the code of all that is reached into a module, each function once."""
+        found = set()
+        waiting = list(self._linking_libraries)
+        while waiting:
+            library = waiting.pop()
+            if library in found:
+                continue
+            found.add(library)
+            if isinstance(library, KernelLibrary):
+                waiting.extend(library._linking_libraries)
+                module.link_in(library._for_callers(), preserve=True)
+            else:
+                module.link_in(library._get_module_for_linking(), preserve=True)
+
+    def _for_callers(self) -> Any:
+        """Return the function's own code, in a form that may stand in several modules."""
+        self._ensure_finalized()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                function.linkage = "linkonce_odr"
+        return self._final_module
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code with all that it reaches: what a function that is no kernel takes in."""
+        if self._shared_module is None:
+            module = self._for_callers().clone()
+            self._link_reached(module)
+            self._shared_module = module
+        return self._shared_module
+
+
+class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A kernel: `overloads` are compiled for Python to call, `_lowered` for kernels to take in."""
+
+    def __init__(self, py_func: Any, locals: Any = None, targetoptions: Any = None, **options: Any) -> None:
+        super().__init__(py_func, locals=locals, targetoptions=targetoptions, **options)
+        self._lowered: dict[Any, Any] = {}
+
+    def compile(self, sig: Any) -> Any:
+        """Return what Python calls for arguments of the given types, compiling it if nobody has."""
+        arguments = tuple(sigutils.normalize_signature(sig)[0])
+        with global_compiler_lock:
+            if arguments in self.overloads:
+                return self.overloads[arguments].entry_point
+            name, key = name_of(self, arguments), key_of(self, arguments)
+            result = self._kept(name, key)
+            if result is None:
+                with store.claim(name, key):  # another process may compile it: then it is there after the wait
+                    result = self._kept(name, key) or self._compiled(arguments, name, key)
+            self.add_overload(result)
+            return result.entry_point
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how a kernel calls this one; constants count as numbers like others."""
+        pysig, folded = self._compiler.fold_argument_types(args, kws)
+        arguments = tuple(types.unliteral(argument) for argument in folded)
+        details = {"dispatcher": self, "args": arguments, "return_type": None}
+        with global_compiler_lock, _lowering():
+            if arguments not in self._lowered:
+                with event.trigger_event("numba:compile", data=details):
+                    self._lower(arguments)
+            result = self._lowered[arguments]
+        template = typing.make_concrete_template(self.py_func.__name__, self.py_func.__name__, [result.signature])
+        return template, pysig, arguments, {}
+
+    def get_overload(self, sig: Any) -> Any:
+        """Return what stands for the kernel in one that calls it."""
+        return self._lowered[tuple(sigutils.normalize_signature(sig)[0])].entry_point
+
+    def _kept(self, name: str, key: str) -> Any:
+        """Return the kernel from its file, or None."""
+        payload = store.load(name, key)
+        if payload is None:
+            return None
+        self.targetctx.refresh()  # as numba does before it reads its own cache
+        try:
+            result = CompileResult._rebuild(self.targetctx, *pickle.loads(payload))
+        except Exception:  # whole, and yet of no use: compiling it again mends it
+            store.discard(name, key)
+            return None
+        self._cache_hits[tuple(result.signature.args)] += 1
+        return result
+
+    def _compiled(self, arguments: tuple[Any, ...], name: str, key: str) -> Any:
+        """Compile the kernel and keep it."""
+        counted = progress.counted()
+        counted.begin(len(reached(self)))
+        details = {"dispatcher": self, "args": arguments, "return_type": None}
+        try:
+            with event.trigger_event("numba:compile", data=details), _lowering():
+                result = self._wrapped(self._lower(arguments))
+        finally:
+            counted.end()
+        self._cache_misses[arguments] += 1
+        store.save(name, key, serialize.dumps(result._reduce()))
+        return result
+
+    def _wrapped(self, lowered: Any) -> Any:
+        """Return what was lowered as machine code that Python can call."""
+        context, described = lowered.target_context, lowered.fndesc
+        library = context.codegen().create_library(described.qualname)
+        library.enable_object_caching()
+        with context.push_code_library(library):
+            context.create_cpython_wrapper(
+                library, described, lowered.environment, lowered.call_helper, release_gil=True
+            )
+        library.add_linking_library(lowered.library)
+        library.finalize()
+        library.emit()
+        entry = context.get_executable(library, described, lowered.environment)
+        return lowered._replace(library=library, entry_point=entry, type_annotation="")
+
+    def _lower(self, arguments: tuple[Any, ...]) -> Any:
+        if arguments not in self._lowered:
+            with self._compiling_counter:
+                self._lowered[arguments] = self._compiler.compile(arguments, None)
+        return self._lowered[arguments]
+
+
+@contextlib.contextmanager
+def _lowering() -> Iterator[None]:
+    """Let numba make `KernelLibrary` of what it compiles; under its lock, so nothing of another thread is meant."""
+    cpu_target.target_context.refresh()  # numba's own runtime is a library too, and no kernel
+    codegen: Any = cpu_target.target_context.codegen()
+    changed: Any = types.Function
+    if "_library_class" in vars(codegen):  # within another
+        yield
+        return
+    collecting = gc.isenabled()
+    gc.disable()
+    changed.get_call_type = _operator_types
+    codegen._library_class = KernelLibrary
+    codegen.set_env = lambda name, environment: None  # until it is emitted it has no place for one
+    try:
+        yield
+    finally:
+        del codegen._library_class, codegen.set_env, changed.get_call_type
+        if collecting:
+            gc.enable()
+
+
+def _operator_types(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Return the types of a call as numba does; those of operators on numbers are looked for once, not at each use."""
+    of_numbers = all(type(argument) in _NUMBERS for argument in args)
+    if kws or not of_numbers or getattr(self.typing_key, "__module__", None) != operator.add.__module__:
+        return super(types.Function, self).get_call_type(context, args, kws)
+    known = _known_operators.get((id(self), args))
+    if known is None:
+        known = _known_operators[id(self), args] = (super(types.Function, self).get_call_type(context, args, kws), self)
+    return known[0]
+
+
+def _same_options(self: Any, other: Any) -> Any:
+    if not isinstance(other, TargetConfig):
+        return NotImplemented
+    mine, others = self._values, other._values
+    if mine == others:
+        return True
+    options = self.options
+    return options.keys() == other.options.keys() and all(
+        mine.get(name, options[name].default) == others.get(name, options[name].default)
+        for name in mine.keys() | others.keys()
+    )
+
+
+def _hash_of_options(self: Any) -> int:
+    return hash(type(self))
+
+
+if AVAILABLE:
+    _options: Any = TargetConfig
+    _options.__eq__ = _same_options  # as numba's, which builds a dictionary of all options each time
+    _options.__hash__ = _hash_of_options  # numba's hashes the names of the options, which are always the same

@@ -1,0 +1,108 @@
+"""Kernels that scenarios call: with the types they take declared, they can be compiled before anything calls them.
+
+`compile_entries` makes a list of them ready, the longest first, and leaves to another process what that one is
+compiling: so any number of processes that call it share the work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+from typing import Any, TypeVar
+
+from numba import types
+
+from replay.numerics.jit import progress, store
+from replay.numerics.jit.reach import key_of, name_of, reached
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def record(named_tuple: type, *fields: Any) -> Any:
+    """Return the numba type of a named tuple, given those of its fields in order."""
+    if len({*fields}) == 1:
+        return types.NamedUniTuple(fields[0], len(fields), named_tuple)
+    return types.NamedTuple(fields, named_tuple)
+
+
+def entry(*arguments: Any) -> Callable[[Function], Function]:
+    """Declare the numba types of what scenarios call a kernel with; stands above the kernel's own decorator."""
+
+    def declared(kernel: Function) -> Function:
+        kernel.declared = arguments  # type: ignore[attr-defined]
+        return kernel
+
+    return declared
+
+
+def entries_of(*modules: ModuleType) -> tuple[Any, ...]:
+    """Return the kernels that modules declare as entries, in the order in which they stand there."""
+    return tuple(
+        value
+        for module in modules
+        for value in vars(module).values()
+        if hasattr(value, "declared") and value.__module__ == module.__name__
+    )
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A kernel and its declared arguments, with what takes a moment to find out."""
+
+    kernel: Any
+
+    @cached_property
+    def name(self) -> str:
+        return name_of(self.kernel, self.kernel.declared)
+
+    @cached_property
+    def key(self) -> str:
+        return key_of(self.kernel, self.kernel.declared)
+
+    @cached_property
+    def size(self) -> int:
+        """How many kernels it reaches, itself included."""
+        return len(reached(self.kernel))
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is compiled already, by this process or another."""
+        return store.has(self.name, self.key)
+
+
+def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: None) -> None:
+    """Make kernels ready to be called with what they declare: from their files, or by compiling them.
+
+    Args:
+        kernels: decorated by `entry`; without a compiler (NUMBA_DISABLE_JIT) there is nothing to do.
+        share: called when more than one is not compiled yet, so that other processes can be asked to do the same.
+    """
+    entries = [_Entry(kernel) for kernel in dict.fromkeys(kernels) if hasattr(kernel, "compile")]
+    missing = [entry for entry in entries if not entry.is_ready]
+    if missing:
+        missing.sort(key=lambda entry: -entry.size)
+        if len(missing) > 1:
+            share()
+        _compile(missing)
+    for each in entries:
+        each.kernel.compile(each.kernel.declared)
+
+
+def _compile(missing: list[_Entry]) -> None:
+    mine: list[_Entry] = []
+
+    def elsewhere() -> int:
+        return sum(entry.size for entry in missing if entry not in mine and entry.is_ready)
+
+    counted = progress.counted()
+    counted.begin(sum(entry.size for entry in missing), elsewhere)
+    try:
+        for last in (False, True):  # what others are compiling comes last, and is done by then, or they are dead
+            for entry in missing:
+                if not entry.is_ready and (last or not store.is_claimed(entry.name, entry.key)):
+                    mine.append(entry)
+                    entry.kernel.compile(entry.kernel.declared)
+    finally:
+        counted.end()

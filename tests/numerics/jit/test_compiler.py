@@ -1,0 +1,120 @@
+"""Kernels compiled by the way into numba and by its public decorator: the same results, and each where it belongs."""
+
+import gc
+
+import numba
+import numpy as np
+import pytest
+from numba import float64, njit
+from numba.core.targetconfig import TargetConfig
+
+from replay.numerics.jit import compiler, kernel, leaf_kernel
+
+FAKED = "import numba\nnumba.__version__ = '0.99.0'\n"
+
+
+def test_the_numba_of_the_tests_is_one_that_was_tried():
+    assert compiler.AVAILABLE, (
+        f"numba {numba.__version__} is not tried: see the text of replay/numerics/jit/compiler.py"
+    )
+
+
+@pytest.mark.parametrize(
+    "another",
+    [FAKED, "from numba.core.registry import CPUDispatcher\nimport numba.core.codegen as c\ndel c.JITCodeLibrary\n"],
+    ids=["another version", "a name is gone"],
+)
+def test_with_another_numba_kernels_are_compiled_by_its_public_decorator(package, another):
+    package.write("collision/caller.py", another + (package.root / "collision" / "caller.py").read_text())
+    code = "import numba.core.registry as r; print(outer(1.0), alone(1.0), type(outer) is r.CPUDispatcher)"
+    assert package.run(code) == "20.0 0.0 True"
+    assert not package.files()
+    assert list(package.cache.rglob("*.nbc"))  # numba's own cache, in a folder named by all sources
+    hits = "print(outer(1.0), sum(outer.stats.cache_hits.values()))"
+    assert package.run(hits) == "20.0 1"
+    callee = (package.root / "geometry" / "callee.py").read_text()
+    package.write("geometry/callee.py", callee.replace("1.0", "2.0"))
+    assert package.run(hits) == "30.0 0"
+
+
+@leaf_kernel
+def _square(x):
+    return x * x
+
+
+@kernel
+def _lengths(rows):
+    result = np.empty(len(rows))
+    for k in range(len(rows)):
+        result[k] = np.sqrt(_square(rows[k, 0]) + _square(rows[k, 1]))
+    return result
+
+
+def test_what_a_kernel_calls_is_lowered_and_only_what_python_calls_is_compiled():
+    rows = np.array([[3.0, 4.0], [5.0, 12.0]])
+    assert _lengths(rows).tolist() == [5.0, 13.0]
+    assert not _square.overloads
+    assert len(_lengths.overloads) == 1
+    assert _square(3.0) == 9.0  # called from here too, it gets a wrapper of its own
+    assert list(_square.overloads) == [(float64,)]
+
+
+def test_constants_among_arguments_make_no_specialisations():
+    @leaf_kernel
+    def power(x, n):
+        result = 1.0
+        for _ in range(n):
+            result *= x
+        return result
+
+    @kernel
+    def powers(x):
+        return power(x, 1) + power(x, 2) + power(x, 3)
+
+    assert powers(2.0) == 14.0
+    assert len(power._lowered) == 1
+
+
+def test_functions_that_are_no_kernels_can_call_kernels():
+    @njit
+    def outside(rows):
+        return _lengths(rows).sum() + _square(2.0)
+
+    assert outside(np.array([[3.0, 4.0]])) == 9.0
+
+
+def test_numbas_own_functions_stay_usable_outside_kernels():
+    @kernel
+    def ours(n):
+        return max(np.zeros(n)[0], 1.0)
+
+    @njit
+    def theirs(n):
+        return max(np.zeros(n)[0], 1.0)
+
+    assert ours(3) == theirs(3) == 1.0
+
+
+def test_wrong_code_is_a_typing_error_and_leaves_nothing_behind():
+    @kernel
+    def wrong(x):
+        return x.nothing
+
+    for _ in range(2):
+        with pytest.raises(numba.core.errors.TypingError, match="nothing"):
+            wrong(1.0)
+    assert gc.isenabled()
+    assert _square(4.0) == 16.0
+
+
+def test_option_sets_compare_as_numbas_do():
+    from numba.core.compiler import Flags
+
+    plain, stated, other = Flags(), Flags(), Flags()
+    stated.nrt = Flags.options["nrt"].default
+    other.nrt = not Flags.options["nrt"].default
+    assert plain == stated
+    assert hash(plain) == hash(stated)
+    assert plain != other
+    assert plain != "something else"
+    assert TargetConfig.values(plain) == TargetConfig.values(stated)
