@@ -129,11 +129,10 @@ class _Assembly:
         self._log = log
         self._file = str(log.path)
         self._provenance = read_provenance(log)
-        if log.loss is None and not log.checked:
-            raise RecordingError(self._file, "damaged: a checksum that every recording has is missing")
-        if log.loss is not None and not log.preamble_checked:
+        if log.loss is not None and not log.preamble_holds:
             raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
         names = {channel.topic for channel in log.channels.values()}
+        self._all = self._provenance.layout
         self._check_topics(names)
         chosen = names
         if wanted is not None:
@@ -269,7 +268,7 @@ class _Assembly:
     def _events(self) -> Events:
         if not self._with_events:
             return Events.none()
-        events = read_events(self._log)
+        events = read_events(self._log).in_order(self._all)
         last = int(self._frames[-1]) if len(self._frames) else -1
         return events[: int(np.searchsorted(events.time, last, side="right"))]
 
