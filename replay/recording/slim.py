@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from replay.errors import RecordingError
+from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Chunk, Op
@@ -107,6 +108,8 @@ def _object(recording: Path, name: str, digest: str) -> bytes:
     if place is None:
         raise RecordingError(str(recording), f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}")
     data = place.read_bytes()
+    if is_lfs_pointer(data):
+        raise RecordingError(str(place), LFS_POINTER)
     if sha256(data) != digest:
         raise RecordingError(str(place), "damaged: its SHA-256 is not its name")
     return data
