@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from mcap.reader import make_reader
@@ -12,13 +13,21 @@ from mcap.writer import Writer
 Order = Literal["log time", "reversed", "shuffled"]
 
 
-def rewritten(recording: bytes, *, order: Order = "log time", seed: int = 1, **options: Any) -> bytes:
+def rewritten(
+    recording: bytes,
+    *,
+    order: Order = "log time",
+    seed: int = 1,
+    extra: Mapping[str, bytes] | None = None,
+    **options: Any,
+) -> bytes:
     """Return a recording as the library writes it.
 
     Args:
         recording: the bytes of one.
         order: of the messages.
         seed: for shuffling.
+        extra: messages of a tool of its own, by topic, without a schema.
         options: of `mcap.writer.Writer`.
     """
     reader = make_reader(io.BytesIO(recording))
@@ -46,6 +55,8 @@ def rewritten(recording: bytes, *, order: Order = "log time", seed: int = 1, **o
                 channel.topic, channel.message_encoding, schemas[schema.id], channel.metadata
             )
         writer.add_message(channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence)
+    for topic, data in (extra or {}).items():
+        writer.add_message(writer.register_channel(topic, "", 0), 0, data, 0)
     for metadata in reader.iter_metadata():
         writer.add_metadata(metadata.name, metadata.metadata)
     summary = reader.get_summary()
