@@ -48,7 +48,9 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
     if size > MAX_CHUNK:
         raise _damage(file, chunk, f"claims {size} bytes, more than the {MAX_CHUNK} that are read")
     try:
-        if chunk.compression == "zstd":
+        if not packed and not size:
+            data = b""
+        elif chunk.compression == "zstd":
             if zstandard.frame_content_size(packed) == size:
                 data = zstandard.ZstdDecompressor().decompress(packed)
             else:  # a frame that does not say its size, or several of them

@@ -133,3 +133,11 @@ def test_conformance_files_are_read_as_their_json_says(salvage: bool) -> None:
             assert found.metadata == {f["name"]: next(iter(f["metadata"].items())) for f in of("Metadata")}, name
             for statistics in of("Statistics"):
                 assert counts == {int(k): int(n) for k, n in statistics["channel_message_counts"].items()}, name
+
+
+def test_statistics_that_claim_more_than_a_file_can_hold_are_damage() -> None:
+    data = bytearray(build(STORED, ("chunks", "counts", "schemas again", "channels again")))
+    claimed = data.rindex(struct.pack("<HQ", 1, 3)) + 2
+    data[claimed : claimed + 8] = struct.pack("<Q", 10**12)
+    with McapLog("claims.mcap", data=bytes(data)) as log, pytest.raises(RecordingError, match="more than it holds"):
+        log.count_of(1)
