@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 
@@ -41,7 +42,21 @@ def behave(payload, follow):
     raise AssertionError(what)
 
 
-def slow_start(tell):
+@dataclass(frozen=True)
+class PrepareTogether:
+    """A preparation that is over when two workers are at it."""
+
+    folder: Path
+
+    def __call__(self, messages):
+        messages.share()
+        (self.folder / str(os.getpid())).touch()
+        messages.progress("waiting")
+        while len(list(self.folder.iterdir())) < 2:
+            time.sleep(0.01)
+
+
+def slow_start(messages):
     """Prepare for longer than the tests' time limits."""
-    tell("preparing")
+    messages.tell("preparing")
     time.sleep(1.0)

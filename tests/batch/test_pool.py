@@ -10,7 +10,7 @@ import pytest
 
 from replay.batch.pool import Ending, Pool, Task
 from replay.errors import InvalidValue
-from tests.batch.tasks import behave, slow_start
+from tests.batch.tasks import PrepareTogether, behave, slow_start
 
 
 def run(tasks, **options):
@@ -73,6 +73,21 @@ def test_time_limits_count_from_the_moment_a_worker_is_ready():
     assert ended["a"].ending is Ending.DONE
     assert ended["a"].seconds < 0.5
     assert said == ["preparing"]
+
+
+def test_a_preparation_that_can_be_shared_is_shared_and_the_helpers_are_let_go(tmp_path):
+    alive, states = [], []
+    before = children()
+    pool = Pool(
+        behave, workers=1, helpers=2, prepare=PrepareTogether(tmp_path), preparing=states.append, follow=lambda *_: None
+    )
+    for ended in pool.run([Task(f"t{k}", ("pid", None)) for k in range(3)]):
+        alive.append((ended.value, children() - before))
+    assert len(list(tmp_path.iterdir())) == 2
+    assert "waiting" in states
+    assert len({worker for worker, _ in alive}) == 1  # one was asked for; the other helped, and is gone
+    assert alive[-1][1] == {alive[-1][0]}
+    assert children() == before
 
 
 def test_workers_live_long_and_the_longest_task_begins_first():

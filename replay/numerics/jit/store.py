@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 import time
 from collections.abc import Iterator
@@ -34,17 +35,21 @@ _PAUSE = 0.05  # seconds
 def directory() -> Path:
     """Return the folder of compiled kernels; it is created when it is first asked for.
 
-    The first writable place wins: NUMBA_CACHE_DIR if set, the package itself, the user's cache folder, and, for a
-    read-only install of a user without a home, a folder of this user in the system's temporary directory.
+    The first place wins that can be written, and by nobody else: numba unpickles what is there. Places are
+    NUMBA_CACHE_DIR if set, the package itself, the user's cache folder, and, for a read-only install of a user without
+    a home, a folder of this user in the system's temporary directory.
     """
     for base in _candidate_bases():
         try:
-            base.mkdir(parents=True, exist_ok=True)
+            base.mkdir(mode=0o700, parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=base):
                 pass
+            others = _who_else_writes(base)
         except OSError:
             continue
-        return base
+        if others is None:
+            return base
+        progress.remark(f"compiled kernels are not kept in {base}: {others}")
     return Path(tempfile.mkdtemp(prefix="replay-kernels-"))
 
 
@@ -58,6 +63,26 @@ def _candidate_bases() -> list[Path]:
         user / "replay" / "kernels",
         Path(tempfile.gettempdir()) / f"replay-kernels-{identity}",
     ]
+
+
+def _who_else_writes(base: Path) -> str | None:
+    """Return why files in a folder may be another user's, or None."""
+    if os.name != "posix":
+        return None
+    user = os.getuid()
+    if base.is_symlink():
+        return "it is a link"
+    if base.stat().st_uid != user:
+        return "it belongs to another user"
+    base.chmod(0o700)
+    for folder in base.resolve().parents:
+        found = folder.stat()
+        if found.st_uid not in (0, user):
+            return f"{folder} belongs to another user"
+        shared = stat.S_IWOTH | (0 if found.st_gid in (0, os.getegid()) else stat.S_IWGRP)
+        if found.st_mode & shared and not found.st_mode & stat.S_ISVTX:
+            return f"others can write to {folder}"
+    return None
 
 
 def _path(name: str, key: str) -> Path:

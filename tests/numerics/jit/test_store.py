@@ -40,6 +40,26 @@ def test_an_install_that_cannot_be_written_uses_the_users_cache_folder(package, 
     assert package.run("outer(1.0); print(directory())", **nowhere).startswith(str(tmp_path))
 
 
+@pytest.mark.skipif(os.name != "posix", reason="owners and modes are a matter of POSIX")
+def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(progress, "_remark", said.append)
+    monkeypatch.setattr(progress, "_said", set())
+    open_to_all, real, own = tmp_path / "open", tmp_path / "real", tmp_path / "own"
+    for folder in (open_to_all / "kernels", real, own):
+        folder.mkdir(parents=True)
+    open_to_all.chmod(0o777)
+    (tmp_path / "link").symlink_to(real)
+    monkeypatch.setattr(store, "_candidate_bases", lambda: [open_to_all / "kernels", tmp_path / "link", own])
+    store.directory.cache_clear()
+    try:
+        assert store.directory() == own
+    finally:
+        store.directory.cache_clear()
+    assert [text.rsplit(": ", 1)[1] for text in said] == [f"others can write to {open_to_all}", "it is a link"]
+    assert own.stat().st_mode & 0o777 == 0o700
+
+
 @pytest.mark.parametrize("damage", ["cut", "another's"])
 def test_a_damaged_file_is_compiled_again_and_mended(package, damage):
     package.run(HITS)

@@ -1,0 +1,25 @@
+"""What is seen on stderr while a run goes on."""
+
+from replay.cli.progress import RunProgress
+from replay.numerics.compiling import Compiling
+
+
+def test_kernels_are_counted_while_they_are_compiled_and_told_in_one_line_at_the_end(capsys):
+    with RunProgress() as progress:
+        progress.plan({"a": 1.0})
+        progress.prepare(Compiling(1, 9, 2.0))
+        progress.prepare(Compiling(4, 9, 3.0))  # of another worker; lines come every five seconds
+        progress.prepare(Compiling(3, 9, 4.0))
+        progress.follow("a", 0, 0)
+        progress.follow("a", 1, 2)
+    assert capsys.readouterr().err.splitlines() == [
+        "replay: compiling kernels: 1 of 9, 2 s",
+        "replay: compiled 9 kernels in 4.0 s; they are kept",
+    ]
+
+
+def test_nothing_is_told_where_nothing_is_compiled(capsys):
+    with RunProgress() as progress:
+        progress.plan({"a": 1.0})
+        progress.follow("a", 0, 0)
+    assert capsys.readouterr().err == ""
