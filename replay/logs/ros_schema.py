@@ -60,12 +60,15 @@ def types_of(name: str, text: str) -> Types:
     try:
         if re.search(r"^\s*module\s+\w+", text, re.MULTILINE):
             parts = text.split(_IDL_SEPARATOR)
-            bodies = [re.sub(r"\A\s*IDL: .*\n", "", part) for part in parts if part.strip()]
+            bodies = [
+                re.sub(r"\A\s*IDL: .*\n|^\s*#.*$", "", part, flags=re.MULTILINE) for part in parts if part.strip()
+            ]
             found = {key: value for body in bodies for key, value in get_types_from_idl(body).items()}
         else:
             found = get_types_from_msg(text, own)
     except (TypesysError, ValueError, KeyError, IndexError, AssertionError, RecursionError) as error:
-        raise ValueError(f"its definition of {name} cannot be read: {error}") from None
+        told = str(error).partition("\n")[0].rstrip(":") or type(error).__name__
+        raise ValueError(f"its definition of {name} cannot be read: {told}") from None
     if own not in found:
         raise ValueError(f"its definition does not describe {name}, but {', '.join(sorted(found)) or 'nothing'}")
     return _BUILT_IN | _fields(found)
