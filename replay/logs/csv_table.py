@@ -157,6 +157,11 @@ def _holds_data(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith(_COMMENT)
 
 
+def is_excerpt(data: bytes) -> bool:
+    """Return whether a file says that it was cut out of another one."""
+    return data.startswith(f"# {EXCERPT} of ".encode())
+
+
 def _origin(line: str) -> dict[str, str]:
     found = re.fullmatch(rf"# {EXCERPT} of (.*), sha256 ([0-9a-f]{{64}})\s*", line)
     return {"name": found[1], "sha256": found[2]} if found else {}

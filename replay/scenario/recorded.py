@@ -13,7 +13,8 @@ import numpy as np
 
 from replay.errors import Problem, RecordingError, count
 from replay.kinematics.motion import FreeTrack, Track
-from replay.logs.csv_table import Format, unit_of
+from replay.logs.csv_table import Format, is_excerpt, unit_of
+from replay.logs.exported import ENDINGS, as_csv
 from replay.logs.joint_csv import read_csv
 from replay.logs.joint_log import Choice, JointLog, read_messages
 from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
@@ -120,7 +121,7 @@ class _Reader:
             raise Unusable((*PATH, "file"), "is a pointer of Git LFS, not the log itself; get it with: git lfs pull")
         kind = self._name.rpartition(".")[2].lower()
         messages = is_message_log(data) or kind in ("mcap", "bag", "db3")
-        if not messages and kind not in _TABLES:
+        if not messages and kind not in (*_TABLES, *ENDINGS):
             raise Unusable(
                 (*PATH, "file"), "is neither a .mcap nor a .csv file, nor a ROS bag (.bag, .db3, its folder)"
             )
@@ -131,6 +132,8 @@ class _Reader:
         try:
             if messages:
                 return self._of_messages(shown, open_message_log(shown, data)), digest
+            if kind in ENDINGS and not is_excerpt(data):
+                data = as_csv(shown, data)
             units = {unit: factor * 10**9 for unit, factor in TIME.units.items()}
             time = (written.time.column, written.time.unit) if written.time else (None, None)
             format = Format(*time, units, written.separator, written.decimal)

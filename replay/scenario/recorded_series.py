@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 
 APART = 1e-2
 """Least distance [rad or m] of two publishers' values that take turns: below, one encoder's noise looks the same."""
+RARE = 50
+"""Most samples of one publisher to one of the other that still count as taking turns; fewer are dropouts."""
 OFTEN = 2 * 10**8
 """Longest usual time [ns] between samples that take turns: by hand, people write a motion to and fro with fewer."""
 
@@ -94,10 +96,12 @@ _WAY_OUT = "choose one by motion.recorded.channel or frame_id, or, if the log te
 
 
 def check_turns(path: tuple[str | int, ...], time: NDArray[np.int64], value: Floats) -> None:
-    """Refuse samples that two publishers give in turn: two smooth motions, apart from each other, sample by sample.
+    """Refuse samples that two publishers give in turn: two smooth motions, apart from each other.
 
-    Every sample goes to the nearer of the two last values. Two publishers change places often, and each of the two
-    is smooth beside their distance; a joint that goes to and fro by itself is not sampled so often.
+    Where one publisher's sample stands between two of the other's, it is off the line between them by far more than
+    these differ. Of such samples in a row every other one is taken out. What is left is the other's motion, which is
+    smooth beside the distance; in noise it is as rough as before, and a joint that goes to and fro by itself is not
+    sampled so often.
 
     Args:
         path: of the joint, for messages.
@@ -110,28 +114,26 @@ def check_turns(path: tuple[str | int, ...], time: NDArray[np.int64], value: Flo
     if len(time) < 8 or np.median(np.diff(time)) > OFTEN:
         return
     points = value.reshape(len(time), -1)
-    ends = [points[0], points[0]]
-    label = np.zeros(len(points), dtype=np.int64)
-    opened = False
-    within, between = [], []
-    for index, point in enumerate(points[1:], start=1):
-        distance = [float(np.abs(point - end).max()) for end in ends]
-        if not opened and distance[0] > APART:
-            opened, label[index] = True, 1
-        else:
-            label[index] = int(opened and distance[1] < distance[0])
-            within.append(distance[label[index]])
-        if label[index] != label[index - 1]:
-            between.append(float(np.abs(point - points[index - 1]).max()))
-        ends[label[index]] = point
-        if not opened:
-            ends[1] = point
-    fewer = min(int(label.sum()), len(label) - int(label.sum()))
-    turns = len(between)
-    if fewer >= 4 and turns >= 1.2 * fewer and np.median(between) > max(APART, 5 * float(np.median(within))):
-        at = (int(time[_first(label > 0)]) - int(time[0])) / 1e9
-        rule = f"is moved by several publishers in turn: its values change between two motions {turns} times"
-        raise Unusable(path, f"{rule}, first {at:.6g} s into them; {_WAY_OUT}")
+    off, apart = _off_line(points)
+    odd = (off > APART) & (off > 5.0 * apart)
+    run_begin = np.maximum.accumulate(np.where(odd, 0, np.arange(1, len(odd) + 1)))
+    taken = odd & ((np.arange(len(odd)) - run_begin) % 2 == 0)
+    count = int(taken.sum())
+    if count < max(4, len(time) / RARE):
+        return
+    distance = float(np.median(off[taken]))
+    left = points[np.concatenate([[True], ~taken, [True]])]
+    if distance > 5.0 * float(np.median(_off_line(left)[0])):
+        rule = f"is moved by several publishers in turn: {count} samples are {distance:.3g} off the others' motion"
+        raise Unusable(path, f"{rule}, the first at sample {_first(taken) + 1}; {_WAY_OUT}")
+
+
+def _off_line(points: Floats) -> tuple[Floats, Floats]:
+    """Return how far each inner point is off the middle of its neighbours, and how far these are apart: (n - 2,)."""
+    before, after = points[:-2], points[2:]
+    off: Floats = np.abs(points[1:-1] - 0.5 * (before + after)).max(axis=1)
+    apart: Floats = np.abs(after - before).max(axis=1)
+    return off, apart
 
 
 def unwrapped(value: Floats, turn: float) -> Floats:

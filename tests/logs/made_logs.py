@@ -213,7 +213,8 @@ def db3(said: list[Said], *, defined: bool = True, ahead: bool = False, pack=lam
         " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)"
     )
     database.execute(
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB)"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,"
+        " data BLOB NOT NULL)"
     )
     if defined:
         database.execute(
