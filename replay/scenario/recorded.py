@@ -20,6 +20,7 @@ from replay.logs.joint_log import Choice, JointLog, read_messages
 from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
 from replay.scenario.names import SCALAR_JOINTS
 from replay.scenario.problems import did_you_mean
+from replay.scenario.recorded_frames import pose_track
 from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window, unwrapped
 from replay.scenario.source import Library, SourceRule
 from replay.scenario.units import ANGLE, LENGTH, TIME
@@ -32,8 +33,6 @@ PATH = ("motion", "recorded")
 _TABLES = ("csv", "tsv")
 _OF_TABLES = ("time", "separator", "decimal")
 _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
-UNIT = 1e-3
-"""Largest deviation of a logged quaternion's length from 1 that is normalised."""
 _LFS = b"version https://git-lfs.github.com/spec/"
 
 
@@ -267,20 +266,10 @@ class _Reader:
         joint = joints[link].name or link
         if joint in self._scenario.motion.free:
             raise Unusable(path, "is a link that motion.free moves as well; keep one of the two")
-        child = (frame.child or link).removeprefix("/")
-        parents = sorted(parent for one, parent in log.frames if one == child)
-        parent = (frame.parent or (parents[0] if len(parents) == 1 else "")).removeprefix("/")
-        if (child, parent) not in log.frames:
-            known = ", ".join(f"{one} in {other}" for one, other in log.frames) or "none"
-            raise Unusable(path, f"is frame {child!r} in {parent!r}, which is not in the log; its frames are {known}")
-        series = in_window(path, log.frames[child, parent], window)
-        self._rows.update(series.row.tolist())
-        check_turns(path, series.time, series.value[:, :3])
-        length = np.sqrt((series.value[:, 3:] ** 2).sum(axis=1))
-        worst = float(length[np.abs(length - 1.0).argmax()])
-        if abs(worst - 1.0) > UNIT:
-            raise Unusable(path, f"has a rotation in the log that is no unit quaternion: its length is {worst:.6g}")
-        return joint, FreeTrack(window.seconds(series.time), series.value[:, :3], series.value[:, 3:])
+        child, parent = ((name or "").removeprefix("/") for name in (frame.child or link, frame.parent))
+        track, rows = pose_track(path, log.frames, child, parent, window)
+        self._rows.update(rows)
+        return joint, track
 
     def _wrong(self, error: Unusable) -> None:
         self._found.problems.append(self._scenario.provenance.problem(error.path, error.rule))

@@ -260,6 +260,30 @@ def test_what_transforms_cannot_do_is_told(tmp_path, more, message):
     assert message in str(caught.value)
 
 
+def test_frames_are_composed_along_the_tree(tmp_path):
+    """A robot drives in the map and sees a person; its camera is mounted once for all, upside down."""
+    begin, turned = 1_700_000_000 * 10**9, (0.0, 1.0, 0.0, 0.0)  # half a turn about y: x and z change their signs
+    poses = [(begin, "camera", "robot", (0.0, 0.0, 1.5, *turned))]
+    poses += [(begin + STEP * k, "robot", "map", (0.02 * k, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)) for k in range(60)]
+    poses += [
+        (begin + 7 * 10**6 + STEP * k, "human", "camera", (-2.0, 0.1 * k, 0.5, 0.0, 0.0, 0.0, 1.0)) for k in range(60)
+    ]
+    log = made_logs.transforms(poses)
+    scenario = load(tmp_path, log, "free: {person: {child: human, parent: map}}")
+    track = scenario.provenance.free_tracks["person"]
+    t = track.seconds
+    seen = np.interp(t, 0.007 + 0.02 * np.arange(60), 0.1 * np.arange(60))
+    inside = t <= 1.0  # beyond, the first one that ends holds
+    expected = np.stack([2.0 + t, seen, np.full(len(t), 1.0)], axis=1)
+    np.testing.assert_allclose(track.xyz[inside], expected[inside], atol=1e-12)
+    np.testing.assert_allclose(np.abs(track.quat_xyzw @ np.array(turned)), 1.0, atol=1e-12)
+    again = load_sources(scenario.main_source, scenario.sources)
+    assert again.sources == scenario.sources
+    np.testing.assert_array_equal(again.provenance.free_tracks["person"].xyz, track.xyz)
+    back = load(tmp_path, log, "free: {person: {child: map, parent: human}}").provenance.free_tracks["person"]
+    np.testing.assert_allclose(back.xyz, track.xyz * [1, -1, 1], atol=1e-12)
+
+
 def test_two_publishers_of_a_frame_are_refused(tmp_path):
     ghost = [(t + 5_000_000, child, parent, (9.0, *pose[1:])) for t, child, parent, pose in walking()]
     with pytest.raises(ScenarioError, match="several publishers in turn"):
