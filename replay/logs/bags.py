@@ -96,7 +96,7 @@ def _checked(name: str, what: str, make: Callable[[], MessageLog]) -> MessageLog
 
 
 def _told(error: Exception) -> str:
-    return str(error).rstrip(".") or type(error).__name__
+    return str(error).partition("\n")[0].rstrip(".") or type(error).__name__
 
 
 class _InMemory:

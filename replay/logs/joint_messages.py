@@ -77,7 +77,7 @@ def decoder(name: str, channel: Channel, schema: Schema | None) -> Decoder:
         try:
             return decode(message)
         except Exception as error:  # each format's library fails in ways of its own on bytes that are not its messages
-            reason = str(error) or type(error).__name__
+            reason = str(error).partition("\n")[0] or type(error).__name__
             raise RecordingError(
                 name, f"topic {channel.topic!r} holds a message that is no joint state or transform: {reason}"
             ) from None
