@@ -14,7 +14,7 @@ import numpy as np
 from replay.errors import RecordingError
 from replay.logs.csv_table import Format, Table, unit_of
 from replay.logs.excerpt import EXCERPT
-from replay.logs.joint_log import JointLog, Series, leading_zeros
+from replay.logs.joint_log import JointLog, Series, leading_zeros, unrepeated
 from replay.logs.times import date_nanoseconds, nanoseconds
 
 _WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
@@ -82,7 +82,7 @@ class _Log:
 
     def _series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column, or None if it holds something else than numbers and is not needed."""
-        found: dict[tuple[int, float], int] = {}
+        values, rows = [], []
         for index in range(self._skip, len(self._times)):
             cell = self._table.rows[index][column]
             if not cell:
@@ -92,9 +92,12 @@ class _Log:
                 if heading in self._needed:
                     raise RecordingError(self._name, self._no_number(index, heading, cell))
                 return None
-            found.setdefault((self._times[index], value), index)
-        time = np.array([time for time, _ in found], dtype=np.int64)
-        return Series(time, np.array([value for _, value in found]), np.array([*found.values()], dtype=np.int64))
+            values.append(value)
+            rows.append(index)
+        row = np.array(rows, dtype=np.int64)
+        time, position = np.array(self._times, dtype=np.int64)[row], np.array(values, dtype=np.float64) + 0.0
+        first = unrepeated(time, position)
+        return Series(time[first], position[first], row[first])
 
     def _found_decimal(self) -> str:
         """Return the sign between whole and decimal digits: a comma where numbers have one and none has a point."""

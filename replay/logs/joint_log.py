@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from replay.errors import RecordingError
 from replay.logs.excerpt import EXCERPT, write_messages
-from replay.logs.joint_messages import JOINTS, TRANSFORMS, Decoder, Pose, Sample, decoder, kind_of
+from replay.logs.joint_messages import JOINTS, TRANSFORMS, Decoder, Sample, decoder, kind_of
 from replay.logs.mcap_records import Channel
 from replay.logs.message_log import Message, MessageLog
 from replay.logs.times import MAX_TIME
@@ -117,20 +117,10 @@ def read_messages(name: str, log: MessageLog, choice: Choice) -> JointLog:
     rows = _rows(log, decoders, choice.frame_id)
     rows.sort(key=lambda row: (row.message.time, row.samples[0].stamp))
     times, left_out = _times(name, rows, choice.max_gap)
-    found: dict[Any, _Samples] = {}
-    for index, row in enumerate(rows):
-        for sample, time in zip(row.samples, times[index], strict=True):
-            if time is None:
-                continue
-            for key, value in sample.values:
-                pose = isinstance(value, tuple)
-                series = (_frame(key), _frame(sample.frame_id)) if pose else key
-                publisher = (row.message.channel, "" if pose else sample.frame_id)
-                found.setdefault(series, _Samples()).add(publisher, time, value, index)
-    if not found:
+    tracks = _series(rows, times)
+    if not tracks:
         told = f" with frame_id {choice.frame_id!r}" if choice.frame_id is not None else ""
         raise RecordingError(name, f"has no message with positions of joints on topic {_topic(choice)!r}{told}")
-    tracks = {key: samples.series() for key, samples in sorted(found.items(), key=lambda item: repr(item[0]))}
     begin, first = min((int(one.time.min()), int(one.row[one.time.argmin()])) for one in tracks.values())
     channel = rows[first].message.channel
     later = (index for index in range(first + 1, len(rows)) if rows[index].message.channel == channel)
@@ -191,7 +181,7 @@ def _rows(log: MessageLog, decoders: Mapping[int, Decoder], frame_id: str | None
     for message in log.messages(decoders.keys()):
         samples = decoders[message.channel](message.data)
         if frame_id is not None:
-            samples = [s for s in samples if s.frame_id == frame_id or any(isinstance(v, tuple) for _, v in s.values)]
+            samples = [sample for sample in samples if sample.frame_id == frame_id or sample.is_pose]
         if samples:
             rows.append(_Row(message, samples))
     return rows
@@ -233,34 +223,59 @@ def leading_zeros(stamps: Sequence[int], max_gap: int) -> int:
     return count if alone else 0
 
 
-class _Samples:
-    """The samples of one joint or frame, publisher by publisher, in the order of the log."""
+@dataclass(eq=False)
+class _Group:
+    """Samples of one publisher that tell the same joints."""
 
-    def __init__(self) -> None:
-        self._known: set[Any] = set()
-        self._found: dict[Publisher, tuple[list[int], list[float | Pose], list[int]]] = {}
+    times: list[int] = field(default_factory=list)
+    values: list[Any] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
 
-    def add(self, publisher: Publisher, time: int, value: float | Pose, row: int) -> None:
-        """Take the next one, unless the very same is there already."""
-        if (time, value) in self._known:
-            return
-        self._known.add((time, value))
-        times, values, rows = self._found.setdefault(publisher, ([], [], []))
-        times.append(time)
-        values.append(value)
-        rows.append(row)
 
-    def series(self) -> Series:
-        """Return them, one publisher after the other."""
-        parts = sorted(self._found.items(), key=lambda item: min(item[1][0]))
-        turns = any(min(later[0]) <= max(earlier[0]) for (_, earlier), (_, later) in itertools.pairwise(parts))
-        times, values, rows = ([one for _, part in parts for one in part[k]] for k in range(3))
-        return Series(
-            np.array(times, dtype=np.int64),
-            np.array(values, dtype=np.float64),
-            np.array(rows, dtype=np.int64),
-            tuple(publisher for publisher, _ in parts) if turns else (),
-        )
+def _series(rows: Sequence[_Row], times: Sequence[Sequence[int | None]]) -> dict[Any, Series]:
+    """Return the samples by joint and by frame, whose order is that of `Series`."""
+    groups: dict[tuple[Publisher, str | None, tuple[str, ...]], _Group] = {}
+    for index, (row, mine) in enumerate(zip(rows, times, strict=True)):
+        for sample, time in zip(row.samples, mine, strict=True):
+            if time is not None and sample.names:
+                parent = _frame(sample.frame_id) if sample.is_pose else None
+                publisher = (row.message.channel, sample.frame_id if parent is None else "")
+                group = groups.setdefault((publisher, parent, sample.names), _Group())
+                group.times.append(time)
+                group.values.append(sample.values)
+                group.rows.append(index)
+    parts: dict[Any, dict[Publisher, list[Series]]] = {}
+    for (publisher, parent, names), group in groups.items():
+        values = np.array(group.values, dtype=np.float64) + 0.0  # -0.0 and 0.0 are one position
+        stood = np.array(group.times, dtype=np.int64), np.array(group.rows, dtype=np.int64)
+        for column, name in enumerate(names):
+            key = name if parent is None else (_frame(name), parent)
+            parts.setdefault(key, {}).setdefault(publisher, []).append(Series(stood[0], values[:, column], stood[1]))
+    return {key: _joined(by_publisher) for key, by_publisher in sorted(parts.items(), key=lambda item: repr(item[0]))}
+
+
+def _joined(by_publisher: Mapping[Publisher, Sequence[Series]]) -> Series:
+    """Return what several publishers say, one after the other; what one repeats is its first one's."""
+    publisher = [k for k, parts in enumerate(by_publisher.values()) for part in parts for _ in part.time]
+    every = [part for parts in by_publisher.values() for part in parts]
+    time, value, row = (np.concatenate([getattr(part, name) for part in every]) for name in ("time", "value", "row"))
+    order = np.argsort(row, kind="stable")
+    order = order[unrepeated(time[order], value[order])]
+    owner = np.array(publisher)[order]
+    found = [(name, order[owner == k]) for k, name in enumerate(by_publisher) if (owner == k).any()]
+    found.sort(key=lambda item: int(time[item[1]].min()))
+    turns = any(time[later].min() <= time[earlier].max() for (_, earlier), (_, later) in itertools.pairwise(found))
+    order = np.concatenate([mine for _, mine in found])
+    return Series(time[order], value[order], row[order], tuple(name for name, _ in found) if turns else ())
+
+
+def unrepeated(time: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which samples (n,) are not there before: at the same time with the same value (n,) or (n, k)."""
+    bits = np.column_stack([time, value.reshape(len(time), -1).view(np.int64)])
+    rows = np.ascontiguousarray(bits).view(np.dtype((np.void, bits.dtype.itemsize * bits.shape[1])))[:, 0]
+    result = np.zeros(len(time), dtype=np.bool_)
+    result[np.unique(rows, return_index=True)[1]] = True
+    return result
 
 
 def _frame(name: str) -> str:

@@ -12,10 +12,10 @@ from replay.errors import RecordingError
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.protobuf import message_type
 from replay.logs.ros_schema import Types, long_name, standard_types, types_of
-from replay.logs.ros_wire import decode_cdr, decode_ros1
+from replay.logs.ros_wire import Memo, decode_cdr, decode_ros1
 from replay.logs.times import date_nanoseconds
 
-Pose = tuple[float, float, float, float, float, float, float]
+Pose = tuple[float, ...]
 """x, y, z [m] and a quaternion x, y, z, w."""
 
 
@@ -26,12 +26,19 @@ class Sample:
     Attributes:
         stamp: [ns], 0 for none.
         frame_id: of its header; of a transform the frame that the pose is in; "" for none.
-        values: positions by joint, or the pose of the child frame.
+        names: joints, or the child frame.
+        values: their positions, or its pose.
     """
 
     stamp: int
     frame_id: str
-    values: Sequence[tuple[str, float | Pose]]
+    names: tuple[str, ...]
+    values: Sequence[float] | Sequence[Pose]
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether it tells a frame's pose, not joints' positions."""
+        return bool(self.values) and isinstance(self.values[0], tuple)
 
 
 Decoder = Callable[[bytes], list[Sample]]
@@ -110,23 +117,25 @@ def _ros_decoder(name: str, channel: Channel, schema: Schema, kind: str) -> Deco
         types: Types = types_of(schema.name, schema.data.decode(errors="replace")) if schema.data else standard_types()
     except ValueError as error:
         raise RecordingError(name, f"topic {channel.topic!r}: {error}") from None
-    own = long_name(schema.name)
+    own, memo = long_name(schema.name), Memo()
     if kind == "sensor_msgs/msg/JointState":
-        return lambda data: [_joint_state(decode(types, own, data))]
+        return lambda data: [_joint_state(decode(types, own, data, memo))]
     if kind == "geometry_msgs/msg/TransformStamped":
-        return lambda data: [_transform_stamped(decode(types, own, data))]
-    return lambda data: [_transform_stamped(item) for item in decode(types, own, data)["transforms"]]
+        return lambda data: [_transform_stamped(decode(types, own, data, memo))]
+    return lambda data: [_transform_stamped(item) for item in decode(types, own, data, memo)["transforms"]]
 
 
 def _protobuf(message: Any) -> list[Sample]:
     if hasattr(message, "joints"):
         stamp = message.timestamp.seconds * 1_000_000_000 + message.timestamp.nanos
-        return [Sample(stamp, "", [(j.name, j.position) for j in message.joints if j.HasField("position")])]
+        told = [joint for joint in message.joints if joint.HasField("position")]
+        return [Sample(stamp, "", tuple(joint.name for joint in told), [joint.position for joint in told])]
     return [
         Sample(
             item.timestamp.seconds * 1_000_000_000 + item.timestamp.nanos,
             item.parent_frame_id,
-            [(item.child_frame_id, _pose(item.translation, item.rotation))],
+            (item.child_frame_id,),
+            [_pose(item.translation, item.rotation)],
         )
         for item in (message.transforms if hasattr(message, "transforms") else [message])
     ]
@@ -139,9 +148,7 @@ def _pose(translation: Any, rotation: Any) -> Pose:
 
 def _joint_state(message: Mapping[str, Any]) -> Sample:
     header = message["header"]
-    return Sample(
-        _header_stamp(header), header["frame_id"], _pairs(message["name"], [float(p) for p in message["position"]])
-    )
+    return Sample(_header_stamp(header), header["frame_id"], *_told(message["name"], message["position"]))
 
 
 def _header_stamp(header: Mapping[str, Any]) -> int:
@@ -153,7 +160,7 @@ def _header_stamp(header: Mapping[str, Any]) -> int:
 def _transform_stamped(message: Mapping[str, Any]) -> Sample:
     header, transform = message["header"], message["transform"]
     pose = _numbers(transform["translation"], "xyz") + _numbers(transform["rotation"], "xyzw")
-    return Sample(_header_stamp(header), header["frame_id"], [(message["child_frame_id"], pose)])  # type: ignore[list-item]
+    return Sample(_header_stamp(header), header["frame_id"], (message["child_frame_id"],), [pose])
 
 
 def _json(data: bytes) -> list[Sample]:
@@ -164,13 +171,14 @@ def _json(data: bytes) -> list[Sample]:
         return [_json_transform(message)]
     if "joints" in message:
         joints = [_object(joint, "a joint") for joint in message["joints"]]
-        values = [(_text(j.get("name")), _number(j["position"])) for j in joints if "position" in j]
-        return [Sample(_stamp(message.get("timestamp")), "", values)]
+        told = [joint for joint in joints if "position" in joint]
+        names = tuple(_text(joint.get("name")) for joint in told)
+        return [Sample(_stamp(message.get("timestamp")), "", names, [_number(joint["position"]) for joint in told])]
     if "name" not in message or "position" not in message:
         raise ValueError(f"it has neither joints nor name and position, but {', '.join(map(repr, message))}")
     header = _object(message.get("header") or {}, "its header")
-    pairs = _pairs(message["name"], [_number(value) for value in message["position"]])
-    return [Sample(_stamp(header.get("stamp")), _text(header.get("frame_id", "")), pairs)]
+    pairs = _told([_text(name) for name in message["name"]], [_number(value) for value in message["position"]])
+    return [Sample(_stamp(header.get("stamp")), _text(header.get("frame_id", "")), *pairs)]
 
 
 def _json_transform(message: Mapping[str, Any]) -> Sample:
@@ -183,18 +191,18 @@ def _json_transform(message: Mapping[str, Any]) -> Sample:
     translation, rotation = (_object(body.get(key) or {}, key) for key in ("translation", "rotation"))
     axes = [(translation, axis) for axis in "xyz"] + [(rotation, axis) for axis in "xyzw"]
     pose = tuple(_number(part.get(axis, 0.0)) for part, axis in axes)
-    return Sample(_stamp(stamp), _text(parent), [(_text(child), pose)])  # type: ignore[list-item]
+    return Sample(_stamp(stamp), _text(parent), (_text(child),), [pose])
 
 
 def _numbers(values: Mapping[str, Any], axes: str) -> tuple[float, ...]:
     return tuple(float(values[axis]) for axis in axes)
 
 
-def _pairs(names: Sequence[Any], positions: Sequence[float]) -> list[tuple[str, float | Pose]]:
-    """Return the joints by name; none where a publisher gives names and no positions, as ROS allows."""
+def _told(names: Sequence[str], positions: Sequence[float]) -> tuple[tuple[str, ...], Sequence[float]]:
+    """Return the joints that are told; none where a publisher gives names and no positions, as ROS allows."""
     if positions and len(names) != len(positions):
         raise ValueError(f"it names {len(names)} joints and gives {len(positions)} positions")
-    return [(_text(name), position) for name, position in zip(names, positions, strict=False)]
+    return tuple(names[: len(positions)]), positions
 
 
 def _stamp(value: Any) -> int:
