@@ -110,6 +110,10 @@ class Table:
         other = [s for s in SEPARATORS if s in line and s not in candidates]
         if len(headings) == 1 and other:
             return f"{rule}; its cells seem to be separated by {SEPARATORS[other[0]]}: state separator"
+        if len(headings) == 1 and len(line.split()) > 1:
+            return f"{rule}; its cells seem to be separated by spaces: separate them by commas"
+        if all(map(_digits, headings)):
+            return f"{rule}: numbers; write headings above them, such as time,joint"
         return f"{rule}; name the one with the times in time.column"
 
     def _cells(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:

@@ -93,7 +93,7 @@ def open_bag_folder(name: str, read: Callable[[str], bytes]) -> tuple[MessageLog
         listed = YAML(typ="safe", pure=True).load(files["metadata.yaml"].decode())["rosbag2_bagfile_information"]
         paths = [str(path).replace("\\", "/").rpartition("/")[2] for path in listed["relative_file_paths"]]
         packed = str(listed.get("compression_mode") or "").lower() == "message"
-    except (YAMLError, UnicodeDecodeError, KeyError, TypeError, AttributeError):
+    except (YAMLError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RecordingError(name, "has a metadata.yaml that is not that of a ROS 2 bag") from None
     if not paths:
         raise RecordingError(name, "has a metadata.yaml that lists no files")

@@ -125,7 +125,7 @@ class _Reader:
                 (*PATH, "file"), "is neither a .mcap nor a .csv file, nor a ROS bag (.bag, .db3, its folder)"
             )
         for option in _OF_TABLES if messages else _OF_MESSAGES:
-            if getattr(written, option):
+            if getattr(written, option) not in (None, {}):
                 more = ", whose messages carry their times" if option == "time" else ""
                 raise Unusable((*PATH, option), f"has no effect with a .{kind} file{more}")
         try:
@@ -153,7 +153,7 @@ class _Reader:
         except SourceRule:
             raise Unusable((*PATH, "file"), str(error)) from None
         for option in _OF_TABLES:
-            if getattr(self._written, option):
+            if getattr(self._written, option) is not None:
                 raise Unusable((*PATH, option), "has no effect with a bag, whose messages carry their times")
         try:
             log, files = open_bag_folder(shown, read)

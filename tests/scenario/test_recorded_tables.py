@@ -90,7 +90,9 @@ def test_a_table_is_read_as_it_is_meant(tmp_path, kind):
 
 
 BAD = {
-    "separated by spaces": ("time arm\n0 0\n", "", "has no column 'time'; its columns are ['time arm']"),
+    "separated by spaces": ("time arm\n0 0\n", "", "its cells seem to be separated by spaces: separate them by commas"),
+    "without headings": ("0,0\n1,1\n", "", "its columns are ['0', '0']: numbers; write headings above them"),
+    "another heading": ("Zeit,arm\n0,0\n", "", "its columns are ['Zeit', 'arm']; name the one with the times in"),
     "another separator than stated": (
         "time;arm\n0;0\n",
         "separator: ','",
@@ -112,7 +114,7 @@ BAD = {
     "unit of dates": ("time,arm\n2024-05-01 12:00:00Z,0\n", "time: {unit: ms}", "which time.unit has no effect on"),
     "UTF-16": ("time,arm\n0,0\n".encode("utf-16"), "", "is UTF-16 text; save it as UTF-8"),
     "a pointer": (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", "", "git lfs pull"),
-    "a channel of a table": ("time,arm\n0,0\n", "channel: 1", "has no effect with a .csv file"),
+    "a channel of a table": ("time,arm\n0,0\n", "channel: 0", "has no effect with a .csv file"),
     "a huge exponent": ("time,arm\n1e9999,0\n", "", "1e9999 is beyond 146 years"),
     "a heading twice": ("time,arm,arm\n0,0,0\n", "", "has a heading twice"),
     "comments alone": ("# time,arm\n", "", "has no headings in its first line"),
