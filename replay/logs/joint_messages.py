@@ -112,9 +112,10 @@ def _decode_of(name: str, channel: Channel, schema: Schema | None) -> Decoder:
 
 
 def _ros_decoder(name: str, channel: Channel, schema: Schema, kind: str) -> Decoder:
-    decode = decode_ros1 if channel.encoding == "ros1" else decode_cdr
+    ros1 = channel.encoding == "ros1"
+    decode, text = decode_ros1 if ros1 else decode_cdr, schema.data.decode(errors="replace")
     try:
-        types: Types = types_of(schema.name, schema.data.decode(errors="replace")) if schema.data else standard_types()
+        types: Types = types_of(schema.name, text, ros1=ros1) if text.strip() else standard_types(ros1=ros1)
     except ValueError as error:
         raise RecordingError(name, f"topic {channel.topic!r}: {error}") from None
     own, memo = long_name(schema.name), Memo()

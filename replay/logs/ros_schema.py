@@ -48,8 +48,15 @@ def long_name(name: str) -> str:
 
 
 @functools.lru_cache(maxsize=64)
-def types_of(name: str, text: str) -> Types:
+def types_of(name: str, text: str, *, ros1: bool = False) -> Types:
     """Return the types that a definition of message `name` describes; some logs call `.msg` text IDL, and are read.
+
+    What it refers to without describing it is taken from ROS's own types.
+
+    Args:
+        name: of the type, in ROS 1's or ROS 2's form.
+        text: the definition.
+        ros1: whose types stand for what is missing: ROS 1's `Header` has one field more.
 
     Raises:
         ValueError: the text is no definition, or does not describe that message.
@@ -71,15 +78,18 @@ def types_of(name: str, text: str) -> Types:
         raise ValueError(f"its definition of {name} cannot be read: {told}") from None
     if own not in found:
         raise ValueError(f"its definition does not describe {name}, but {', '.join(sorted(found)) or 'nothing'}")
-    return _BUILT_IN | _fields(found)
+    types = _BUILT_IN | _fields(found)
+    if any("/" in field.type and field.type not in types for fields in types.values() for field in fields):
+        return {**standard_types(ros1=ros1), **types}
+    return types
 
 
 @functools.cache
-def standard_types() -> Types:
-    """Return ROS 2's own types, for bags that carry no definitions."""
+def standard_types(*, ros1: bool = False) -> Types:
+    """Return ROS's own types, for bags that carry no definitions."""
     from rosbags.typesys import Stores, get_typestore
 
-    return _fields(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
+    return _fields(get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE).fielddefs)
 
 
 def _fields(found: Mapping[str, Any]) -> dict[str, tuple[Field, ...]]:

@@ -113,13 +113,15 @@ class _Reader:
         self._begin = begin
         self._encoding = encoding
         self._memo = memo
+        self._left = len(data) + 1000  # a struct without fields takes no byte, and one may hold many of many
         self._unsigned = struct.Struct(f"{encoding.order}I").unpack_from
         self._step = min(4, encoding.align) - 1
 
     def struct(self, name: str, depth: int) -> dict[str, Any]:
         """Return the values of the message type `name`."""
-        if depth > _MAX_DEPTH:
-            raise ValueError("its definition is nested too deeply")
+        self._left -= 1
+        if depth > _MAX_DEPTH or self._left < 0:
+            raise ValueError("its definition is nested too deeply, or holds too much of nothing")
         if self._encoding.align == 1 and name in _ROS1_TIMES:
             return dict(zip(("sec", "nanosec"), self._numbers(_ROS1_TIMES[name], 4), strict=True))
         if name not in self._types:

@@ -189,7 +189,7 @@ class _Reader:
         exported = {unit_of(name)[0]: name for name in log.joints}
         common = {}
         for mine in self._scalar_joints():
-            theirs = mine if mine in log.joints else exported.get(f"{mine} position", "")
+            theirs = mine if mine in log.joints else exported.get(f"{mine} position", exported.get(mine, ""))
             if theirs and not self._scripted(mine):
                 common[mine] = RecordedJoint(name=theirs)
         if not common and not self._written.free:

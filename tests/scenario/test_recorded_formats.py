@@ -218,6 +218,15 @@ def test_the_encoders_of_these_tests_are_those_of_ros():
     assert (one["name"], one["position"]) == (ours["name"], ours["position"])
 
 
+@pytest.mark.parametrize("language", ["ros1msg", "ros2msg"])
+def test_what_a_definition_leaves_out_is_ross_own(language):
+    said = source(np.random.default_rng(4))[3]
+    short = made_logs.definition(language).decode().partition("====")[0]
+    decode, encode = (decode_ros1, made_logs.ros1) if language == "ros1msg" else (decode_cdr, made_logs.cdr)
+    message = decode(types_of(ROS, short, ros1=language == "ros1msg"), ROS, encode(said))
+    assert dict(zip(message["name"], message["position"], strict=True)) == said.joints
+
+
 @pytest.mark.parametrize("kind", ["cdr", "xcdr2, delimited", "ros1"])
 def test_a_message_that_its_definition_does_not_use_up_is_none(tmp_path, kind):
     said = source(np.random.default_rng(2))

@@ -50,6 +50,7 @@ GOOD = {
     "empty lines of a spreadsheet": ("time,arm\n0,0\n0.400000001,0.5\n1,1.25\n,\n,\n", ""),
     "a line twice": ("time,arm\n0,0\n0.400000001,0.5\n0.400000001,0.5\n1,1.25\n", ""),
     "unit in the heading": ("time [ms],arm\n0,0\n400.000001,0.5\n1000,1.25\n", ""),
+    "units in both headings": ("time [us],arm [mrad]\n0,0\n400000.001,500\n1000000,1250\n", ""),
     "angle's unit in the heading": (
         "time,arm angle [deg]\n0,0\n0.400000001,28.64788975654116\n1,71.6197243913529\n",
         "joints: {arm: {name: 'arm angle [deg]'}}",
