@@ -94,11 +94,7 @@ def test_other_encodings_are_named(data, message):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [
-        ("float64", "cannot be read"),
-        ("module a { struct B { long c; }; };", "does not describe"),
-        ("", "does not|cannot"),
-    ],
+    [("float64", "cannot be read"), ("module a { struct B { long c; }; };", "does not describe")],
 )
 def test_other_text_is_no_definition(text, message):
     with pytest.raises(ValueError, match=message):
