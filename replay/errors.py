@@ -92,6 +92,10 @@ class RecordingError(ReplayError):
         super().__init__(f"{file}: {reason}")
 
 
+class ForeignLogError(RecordingError):
+    """An MCAP file that others wrote, where a recording of `replay` is meant."""
+
+
 class RecordingExistsError(ReplayError):
     """The target of a run exists already and overwriting was not asked for."""
 

@@ -71,7 +71,6 @@ def regress(
         raise InvalidValue("--baseline", baseline, "is a file; give the folder that `replay accept` writes")
     check_history(history)
     accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
-    failed = [CaseResult(name, Status.FAILED, error=str(e), invalid=True) for name, e in selection.invalid.items()]
     _forget(directory, [*(scenario.name for scenario in selection.chosen), *selection.invalid])
     run = run_all(
         selection.chosen,
@@ -79,7 +78,7 @@ def regress(
         model=model,
         rrd=rrd == "all",
         overwrite=True,
-        failed=failed,
+        failed=selection.failed,
         execution=execution,
         watch=watch,
     )
@@ -101,7 +100,7 @@ def regress(
         if accepted.recording(name) is None:  # ended before it was stored
             del judged[name]
     ended = [judged.get(scenario.name) or _unjudged(scenario.name, result) for scenario, result in ran]
-    ended += [_unjudged(result.name, result) for result in failed]
+    ended += [_unjudged(result.name, result) for result in selection.failed]
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
     unused = _unused(selection, accepted, {item.name for item in ended})

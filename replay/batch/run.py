@@ -125,8 +125,8 @@ def run_all(
     if resume:
         results = _reused(scenarios, directory, model=model, rrd=rrd, savings=savings, watch=watch)
     elif not overwrite:
-        for scenario in scenarios:
-            for recording in (directory / scenario.name / f"{scenario.name}{kind}" for kind in (".mcap", ".rrd")):
+        for name in (*(scenario.name for scenario in scenarios), *(result.name for result in failed)):
+            for recording in (directory / name / f"{name}{kind}" for kind in (".mcap", ".rrd")):
                 if recording.exists():
                     raise RecordingExistsError(str(recording), resumable=True)
     left = [scenario for scenario in scenarios if scenario.name not in results]

@@ -5,12 +5,16 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import re
+import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from replay.batch.case import CaseResult, Status
+from replay.batch.folders import look_through
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
+from replay.logs.lfs_pointer import is_lfs_pointer
 from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
 
@@ -26,23 +30,22 @@ _NAME_KEY = re.compile(rb"^name[ \t]*:[ \t]*([A-Za-z0-9_][A-Za-z0-9_.-]*)[ \t]*(
 def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     """Return the scenario files that paths stand for, each once, in the order given.
 
-    A file stands for itself. A folder stands for every `*.yaml` and `*.yml` file in it or below, sorted by path, that
-    has a `version` key at its top level: parts that are only included have none. Hidden files and folders, such as an
-    environment's, are not looked at.
+    A file stands for itself. A folder stands for every `*.yaml` and `*.yml` file (in upper or lower case) in it or
+    below, links to folders included, sorted by path, that has a `version` key at its top level: parts that are only
+    included have none. One that cannot be read counts too: nobody knows that it is none. Hidden files and folders, such
+    as an environment's, are not looked at.
 
     Raises:
         InvalidValue: a path is not there or is an `.rrd`, or a folder holds no scenario.
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):
-        if path.is_file() and path.suffix == ".rrd":
+        if path.is_file() and path.suffix.lower() == ".rrd":
             raise InvalidValue("SCENARIO", path, "holds drawings only; the .mcap beside it can be run again")
         if path.is_file():
             found[path] = None
         elif path.is_dir():
-            files = sorted(file for pattern in ("*.yaml", "*.yml") for file in path.rglob(pattern) if file.is_file())
-            visible = [f for f in files if not any(part.startswith(".") for part in f.relative_to(path).parts)]
-            scenarios = [file for file in visible if _VERSION_KEY.search(file.read_bytes())]
+            scenarios = [file for file in look_through(path).files if _may_be_scenario(file)]
             if not scenarios:
                 raise InvalidValue("SCENARIO", path, "holds no scenario: no *.yaml file with a top-level `version` key")
             found.update(dict.fromkeys(scenarios))
@@ -50,6 +53,19 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
             what = "is neither a file nor a folder" if path.exists() else "is not there"
             raise InvalidValue("SCENARIO", path, f"{what}; give a scenario file, a recording, or a folder")
     return list(found)
+
+
+def _may_be_scenario(file: Path) -> bool:
+    try:
+        data = file.read_bytes()
+    except OSError:
+        return True
+    return _VERSION_KEY.search(data) is not None or is_lfs_pointer(data)
+
+
+def left_out(paths: Sequence[str | Path]) -> list[str]:
+    """Return a line for each place in the folders among paths that `find_scenarios` cannot look at."""
+    return [line for path in map(Path, paths) if path.is_dir() for line in look_through(path).left_out]
 
 
 def rules_beside(paths: Sequence[str | Path]) -> Path | None:
@@ -63,7 +79,8 @@ def load_all(paths: Sequence[str | Path]) -> list[Scenario]:
     """Return the scenarios of all paths: of a file with a sweep its cases, of a recording (`.mcap`) its own scenario.
 
     Raises:
-        ScenarioError: what is wrong with any of them, all problems together; or two have the same name.
+        ScenarioError: what is wrong with any of them, all problems together; or two have names that are one on some
+            file systems.
         RecordingError: a recording cannot be read.
         InvalidValue: see `find_scenarios`.
     """
@@ -77,22 +94,37 @@ def _load(paths: Sequence[str | Path]) -> tuple[list[tuple[Scenario, Path]], dic
     scenarios: list[tuple[Scenario, Path]] = []
     problems: list[Problem] = []
     invalid: dict[Path, ScenarioError] = {}
-    homes: dict[str, Path] = {}
+    homes: dict[str, tuple[str, Path]] = {}
     for path in find_scenarios(paths):
         try:
-            found = [_attached(path)] if path.name.endswith(RECORDINGS) else load_cases(path)
+            found = [_attached(path)] if path.name.lower().endswith(RECORDINGS) else load_cases(path)
         except ScenarioError as error:
             invalid[path] = error
             continue
         for scenario in found:
-            if scenario.name in homes:
-                rule = f"name {scenario.name!r} is taken by {homes[scenario.name]}; each scenario of a run has its own"
-                problems.append(Problem(rule, file=str(path)))
-            homes[scenario.name] = path
+            folder = _folded(scenario.name)
+            if folder in homes:
+                problems.append(Problem(_taken(scenario.name, *homes[folder]), file=str(path)))
+            homes[folder] = scenario.name, path
             scenarios.append((scenario, path))
     if problems:  # of two scenarios with one name, nobody knows which is meant
         _refuse(invalid, problems)
     return scenarios, invalid
+
+
+def _folded(name: str) -> str:
+    """Return what a name is on file systems that take upper and lower case, and all forms of a character, for one."""
+    return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
+
+
+def _taken(name: str, other: str, home: Path) -> str:
+    """Return what is wrong with a name when another scenario, of a file `home`, has it already."""
+    if name == other:
+        return f"name {name!r} is taken by {home}; each scenario of a run has its own"
+    form = unicodedata.normalize("NFC", name) == unicodedata.normalize("NFC", other)
+    what = "the form of its characters (Unicode NFC, NFD)" if form else "upper and lower case"
+    shown = f"{name!a} differs from {other!a}" if form else f"{name!r} differs from {other!r}"
+    return f"name {shown} of {home} only in {what}: on other systems their folders would be one; rename one of them"
 
 
 def _refuse(invalid: Mapping[Path, ScenarioError], problems: Sequence[Problem] = ()) -> None:
@@ -126,18 +158,19 @@ class Selection:
     of_folders: bool
     invalid: Mapping[str, ScenarioError]
 
+    @property
+    def failed(self) -> list[CaseResult]:
+        """The results of the files that are not valid, which cannot be run."""
+        return [CaseResult(n, Status.FAILED, error=str(error), invalid=True) for n, error in self.invalid.items()]
+
     @staticmethod
-    def of(
-        paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None, *, tolerant: bool = False
-    ) -> Selection:
+    def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
         """Return what paths, patterns and a shard select; errors as of `load_all`.
 
-        When `tolerant`, files that are not valid are told in the selection, if there is a valid one in it. What tags
-        they have is not known, so every pattern for tags selects them; they are in the first shard.
+        Files that are not valid are told in the selection, if there is a valid one in it. What tags they have is not
+        known, so every pattern for tags selects them; they are in the first shard.
         """
         loaded, wrong = _load(paths)
-        if not tolerant:
-            _refuse(wrong)
         everything = [scenario for scenario, _ in loaded]
         matching = select(everything, patterns)
         chosen = shard.of(matching) if shard else matching
@@ -159,7 +192,10 @@ class Selection:
 
 def _name_in(path: Path, taken: Collection[str]) -> str:
     """Return the name that a file which is not valid gives its scenario; that of the file when it is none or taken."""
-    found = _NAME_KEY.search(path.read_bytes())
+    try:
+        found = _NAME_KEY.search(path.read_bytes())
+    except OSError:
+        found = None
     numbered = (f"{path.stem}_{number}" for number in itertools.count(2))
     names = itertools.chain([found[1].decode()] if found else [], [path.stem], numbered)
     return next(name for name in names if name not in taken)

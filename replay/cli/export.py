@@ -1,9 +1,9 @@
-"""`replay export`: write a recording's topics as tables."""
+"""`replay export`: write a log's topics as tables."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,22 +26,25 @@ if TYPE_CHECKING:
 def export(recording: Path, form: Format, output: Path | None, topics: tuple[str, ...], overwrite: bool) -> ExitCode:
     """Write topics of RECORDING (.mcap, or the .mcap.part of a stopped run) as csv, json or parquet.
 
-    Of a cut or damaged file, what is whole is written (exit code 3).
+    Any other MCAP log will do: protobuf, JSON and ROS 2 messages become columns. Of a cut or damaged file, what is
+    whole is written (exit code 3).
     """
+    from replay.errors import ForeignLogError
+    from replay.logs.mcap_reader import McapLog
     from replay.recording.export import export as write
     from replay.recording.reader import read
 
-    found = read(recording, salvage=True)
-    files = write(
-        found,
-        output or recording.parent,
-        format=form,
-        topics=topics or ("*",),
-        overwrite=overwrite,
-    )
+    how: Any = {"format": form, "topics": topics or ("*",), "overwrite": overwrite, "tell": note}
+    try:
+        found = read(recording, salvage=True)
+        files, lost = write(found, output or recording.parent, **how), found.loss_text
+    except ForeignLogError:
+        with McapLog(recording, salvage=True) as log:
+            files = write(log, output or recording.parent, **how)
+            lost = log.loss.reason if log.loss is not None else ""
     for file in files:
         click.echo(str(file))
-    if found.loss is None:
+    if not lost:
         return ExitCode.FINE
-    note(f"{recording}: {found.loss_text}")
+    note(f"{recording}: {lost}")
     return ExitCode.LOSSES

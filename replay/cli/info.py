@@ -1,4 +1,4 @@
-"""`replay info`: say what is in a recording."""
+"""`replay info`: say what is in a recording, or in any other MCAP log."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from replay.cli.values import PathName
 def info(recording: Path, form: str) -> ExitCode:
     """Say what RECORDING (.mcap, or the .mcap.part of a stopped run) holds: topics, counts, provenance.
 
+    Of any other MCAP log: topics, schemas, counts, the time that it spans, and the joints that can drive a motion.
+
     Every checksum of the file is verified on the way; of a cut or damaged file, what is whole is told (exit code 3).
     """
     from replay.recording.summary import summarize
@@ -25,5 +27,5 @@ def info(recording: Path, form: str) -> ExitCode:
     say(form, found.as_text, found.as_json)
     if found.loss is None:
         return ExitCode.FINE
-    note(f"{recording}: {found.loss.text(found.frames, found.provenance.frames)}")
+    note(f"{recording}: {found.loss_text}")
     return ExitCode.LOSSES

@@ -75,6 +75,14 @@ def note(message: str) -> None:
     click.echo(f"replay: {message}", err=True)
 
 
+def note_left_out(paths: Sequence[Path]) -> None:
+    """Say what of folders of scenarios cannot be looked at."""
+    from replay.batch.select import left_out
+
+    for line in left_out(paths):
+        note(f"note: {line}")
+
+
 def nothing(patterns: Sequence[str], shard: Shard | None = None) -> ExitCode:
     """Say that no scenario is left to work on."""
     by = f" by {', '.join(pattern or repr(pattern) for pattern in patterns)}" if patterns else ""

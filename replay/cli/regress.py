@@ -49,7 +49,8 @@ def regress(
     from replay.comparison.rules_file import read_rules
 
     settings = options.settings(how)
-    selection = Selection.of(scenarios, patterns, shard, tolerant=True)
+    selection = Selection.of(scenarios, patterns, shard)
+    options.note_left_out(scenarios)
     if not selection.chosen:
         return options.nothing(patterns, shard)
     rules = rules or rules_beside(scenarios)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from replay.cli import options
-from replay.cli.exit_codes import ExitCode
+from replay.cli.exit_codes import ExitCode, worst
 
 if TYPE_CHECKING:
     from replay.batch.shard import Shard
@@ -38,7 +38,8 @@ def run(
 ) -> ExitCode:
     """Simulate SCENARIOS (files, folders, or recordings to run again) and record them.
 
-    Each goes to OUTPUT/NAME/NAME.mcap and .rrd. Exit code 4: an expectation does not hold, or a scenario failed.
+    Each goes to OUTPUT/NAME/NAME.mcap and .rrd. Exit codes: 2 some are not valid, the others are run; 4 an expectation
+    does not hold, or a scenario failed.
     """
     from replay.batch.run import run_all
     from replay.batch.select import Selection
@@ -48,11 +49,12 @@ def run(
     if how["overwrite"] and how["resume"]:
         raise click.UsageError("--overwrite and --resume exclude each other")
     settings = options.settings(how)
-    chosen = Selection.of(scenarios, patterns, shard).chosen
-    if not chosen:
+    selection = Selection.of(scenarios, patterns, shard)
+    options.note_left_out(scenarios)
+    if not selection.chosen:
         return options.nothing(patterns, shard)
     with RunProgress() as watch:
-        flags = {name: how[name] for name in ("overwrite", "resume")}
-        done = run_all(chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **flags, **settings)
+        settings |= {name: how[name] for name in ("overwrite", "resume")} | {"failed": selection.failed}
+        done = run_all(selection.chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **settings)
     show(form, done)
-    return exit_code(done)
+    return worst([exit_code(done), ExitCode.INVALID if selection.invalid else ExitCode.FINE])

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from replay.cli.exit_codes import ExitCode
-from replay.cli.options import format_option, note, nothing, say, scenarios_argument, select_option
+from replay.cli.options import format_option, note, note_left_out, nothing, say, scenarios_argument, select_option
 from replay.errors import Problem, ScenarioError, count
 
 
@@ -24,6 +24,7 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
     if deep:
         from replay.scenario.scene import build
     chosen = select(load_all(scenarios), patterns)
+    note_left_out(scenarios)
     if not chosen:
         return nothing(patterns)
     lines, data = [], []

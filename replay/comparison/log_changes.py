@@ -32,7 +32,9 @@ def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
     equal = []
     with a.path.open("rb") as file_a, b.path.open("rb") as file_b:
         for number, channel in a.channels.items():
-            if channel != b.channels.get(number) or a.schemas[channel.schema_id] != b.schemas[channel.schema_id]:
+            if channel != b.channels.get(number) or a.schemas.get(channel.schema_id) != b.schemas.get(
+                channel.schema_id
+            ):
                 continue
             mine, others = chunks_a.get(number, []), chunks_b.get(number, [])
             if [_packing(chunk) for chunk in mine] == [_packing(chunk) for chunk in others] and all(
@@ -137,7 +139,10 @@ def _fields(log: McapLog) -> dict[str, str]:
     """Return the type of each field by "topic path"."""
     found: dict[str, str] = {}
     for channel in log.channels.values():
-        schema = log.schemas[channel.schema_id]
+        schema = log.schemas.get(channel.schema_id)
+        if schema is None or schema.encoding != "protobuf":
+            found[f"{channel.topic} schema"] = schema.name if schema is not None else "none"
+            continue
         descriptor = message_type(str(log.path), schema.name, schema.data).DESCRIPTOR
         found[f"{channel.topic} schema"] = schema.name
         found |= {f"{channel.topic} {path}": kind for path, kind in _flat(descriptor, "", 0)}

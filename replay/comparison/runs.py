@@ -15,7 +15,7 @@ from replay.comparison.rules import Rules
 from replay.comparison.signals import places
 from replay.errors import InvalidValue, RecordingError
 from replay.logs.mcap_reader import McapLog
-from replay.recording.reader import Recording, read, read_provenance
+from replay.recording.reader import Recording, own_topics, read, read_provenance
 
 SCENARIOS = "/scenarios"
 """Begins the name of a scenario in rules: `/scenarios/carm_clear` with `ignore` lets it be missing or extra."""
@@ -166,7 +166,10 @@ def read_pair(baseline: str | Path, candidate: str | Path, *, rules: Rules | Non
         }
         lost, added = schema_changes(log_a, log_b)
         scene = () if SCENE in bytes_equal else scene_changes(log_a, log_b)
-        names = [{channel.topic for channel in log.channels.values()} for log in (log_a, log_b)]
+        names = [
+            {channel.topic for channel in log.channels.values()} & own_topics(layout)
+            for log, layout in ((log_a, layout_a), (log_b, layout_b))
+        ]
     return Pair(
         read(baseline, topics=names[0] - equal if equal else None),
         read(candidate, topics=names[1] - equal if equal else None),

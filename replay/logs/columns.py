@@ -25,7 +25,7 @@ class Topic:
     Attributes:
         name: the topic.
         schema: name of the message type.
-        time: (n,) log times [ns].
+        time: (n,) log times [ns], in the order of time.
         columns: by field path, such as "joints[2].position": (n,) or (n, count) values.
         texts: texts and byte strings by field path, when they are the same in every message.
         messages: the decoded messages when they have no common shape (then `columns` is empty), else None.
@@ -119,6 +119,10 @@ class _Reader:
         columns = {path: column[: self._count] for path, column in self._columns.items()}
         texts = self._shape.texts if self._shape else {}
         messages = tuple(self._messages) if self._decoding else None
+        if bool((time[1:] < time[:-1]).any()):  # written anew in another order
+            order = np.argsort(time, kind="stable")
+            time, columns = time[order], {path: column[order] for path, column in columns.items()}
+            messages = None if messages is None else tuple(messages[row] for row in order.tolist())
         return Topic(self.name, self._schema.name, time, columns, texts, messages)
 
     def _add_rows(self, run: Run) -> bool:
@@ -136,10 +140,10 @@ class _Reader:
         return True
 
     def _room(self, path: str, values: NDArray[Any], end: int) -> NDArray[Any]:
-        """Return a column that has room for `end` rows: all that the statistics promise at once, else ever doubled."""
+        """Return a column that has room for `end` rows; it grows by steps, up to what the statistics promise."""
         column = self._columns.get(path)
         if column is None or len(column) < end:
-            rows = max(end, self._expected or 2 * end)
+            rows = max(end, min(self._expected, 8 * end) if self._expected else 2 * end)
             grown = np.empty((rows, *values.shape[1:]), dtype=values.dtype)
             if column is not None:
                 grown[: len(column)] = column

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import CurveError
+from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 Floats = NDArray[np.float64]
 
@@ -116,6 +117,8 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         raise CurveError(str(path), None, f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise CurveError(str(path), None, f"is not UTF-8 text: {error.reason} at byte {error.start}") from None
+    if is_lfs_pointer(text.encode()):
+        raise CurveError(str(path), None, LFS_POINTER)
     lines = [(number, line) for number, line in enumerate(io.StringIO(text), 1) if not line.startswith("#")]
     while lines and not lines[-1][1].strip():
         lines.pop()

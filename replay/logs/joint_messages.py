@@ -11,8 +11,8 @@ from typing import Any
 from replay.errors import RecordingError
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.protobuf import message_type
-from replay.logs.ros_schema import Types, long_name, standard_types, types_of
-from replay.logs.ros_wire import Memo, decode_cdr, decode_ros1
+from replay.logs.ros_messages import ros_decoder
+from replay.logs.ros_schema import long_name
 from replay.logs.times import date_nanoseconds
 
 Pose = tuple[float, ...]
@@ -39,6 +39,12 @@ class Sample:
     def is_pose(self) -> bool:
         """Whether it tells a frame's pose, not joints' positions."""
         return bool(self.values) and isinstance(self.values[0], tuple)
+
+    @property
+    def positions(self) -> list[tuple[str, float]]:
+        """The joints with their positions; none of a pose."""
+        pairs = zip(self.names, self.values, strict=True)
+        return [(name, value) for name, value in pairs if not isinstance(value, tuple)]
 
 
 Decoder = Callable[[bytes], list[Sample]]
@@ -99,10 +105,10 @@ def _decode_of(name: str, channel: Channel, schema: Schema | None) -> Decoder:
     if schema is not None and encoding == "protobuf" and kind.startswith("foxglove.") and kind in JOINTS + TRANSFORMS:
         type_ = message_type(name, schema.name, schema.data)
         return lambda data: _protobuf(type_.FromString(data))
+    decode = ros_decoder(name, channel, schema) if "/" in kind and kind in JOINTS + TRANSFORMS else None
+    if decode is not None:
+        return _of_ros(decode, kind)
     text = schema.encoding if schema is not None else ""
-    ros = {"cdr": ("ros2msg", "ros2idl", "omgidl"), "ros1": ("ros1msg",)}.get(encoding, ())
-    if schema is not None and "/" in kind and kind in JOINTS + TRANSFORMS and text in ros:
-        return _ros_decoder(name, channel, schema, kind)
     described = f" with a schema in {text}" if text else ""
     raise RecordingError(
         name,
@@ -111,19 +117,12 @@ def _decode_of(name: str, channel: Channel, schema: Schema | None) -> Decoder:
     )
 
 
-def _ros_decoder(name: str, channel: Channel, schema: Schema, kind: str) -> Decoder:
-    ros1 = channel.encoding == "ros1"
-    decode, text = decode_ros1 if ros1 else decode_cdr, schema.data.decode(errors="replace")
-    try:
-        types: Types = types_of(schema.name, text, ros1=ros1) if text.strip() else standard_types(ros1=ros1)
-    except ValueError as error:
-        raise RecordingError(name, f"topic {channel.topic!r}: {error}") from None
-    own, memo = long_name(schema.name), Memo()
+def _of_ros(decode: Callable[[bytes], dict[str, Any]], kind: str) -> Decoder:
     if kind == "sensor_msgs/msg/JointState":
-        return lambda data: [_joint_state(decode(types, own, data, memo))]
+        return lambda data: [_joint_state(decode(data))]
     if kind == "geometry_msgs/msg/TransformStamped":
-        return lambda data: [_transform_stamped(decode(types, own, data, memo))]
-    return lambda data: [_transform_stamped(item) for item in decode(types, own, data, memo)["transforms"]]
+        return lambda data: [_transform_stamped(decode(data))]
+    return lambda data: [_transform_stamped(item) for item in decode(data)["transforms"]]
 
 
 def _protobuf(message: Any) -> list[Sample]:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from replay.errors import RecordingError
 from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
 
-_MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
+MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
+"""Bytes of a message record before its data."""
 _op_and_length = struct.Struct("<BQ").unpack_from
 _channel_and_time = struct.Struct("<H4xQ").unpack_from
 
@@ -47,10 +48,14 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
     if size > MAX_CHUNK:
         raise _damage(file, chunk, f"claims {size} bytes, more than the {MAX_CHUNK} that are read")
     try:
-        if chunk.compression == "zstd":
-            if zstandard.frame_content_size(packed) not in (size, -1):
-                raise _damage(file, chunk, "does not unpack to the size it claims")
-            data = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size) if size else b""
+        if not packed and not size:
+            data = b""
+        elif chunk.compression == "zstd":
+            if zstandard.frame_content_size(packed) == size:
+                data = zstandard.ZstdDecompressor().decompress(packed)
+            else:  # a frame that does not say its size, or several of them
+                reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
+                data = reader.read(size + 1)
         elif chunk.compression == "lz4":
             data = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
         elif chunk.compression == "":
@@ -68,18 +73,18 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
 
 def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
     """Return a chunk's messages when all are of one channel and one length (found by one comparison), else None."""
-    if len(data) < _MESSAGE_ROW or data[0] != Op.MESSAGE:
+    if len(data) < MESSAGE_ROW or data[0] != Op.MESSAGE:
         return None
     stride = RECORD_HEAD + int.from_bytes(data[1:RECORD_HEAD], "little")
-    if stride < _MESSAGE_ROW or len(data) % stride:
+    if stride < MESSAGE_ROW or len(data) % stride:
         return None
     rows = np.frombuffer(data, dtype=np.uint8).reshape(-1, stride)
     if not bool((rows[:, :11] == rows[0, :11]).all()):
         return None
     stamps = rows[:, 15:23].copy().view("<u8")[:, 0]
-    _check_times(file, chunk, int(stamps.min()), int(stamps.max()))
+    _check_time(file, chunk, int(stamps.max()))
     channel = int.from_bytes(data[9:11], "little")
-    return Run(channel, stamps.astype(np.int64), rows[:, _MESSAGE_ROW:], ())
+    return Run(channel, stamps.astype(np.int64), rows[:, MESSAGE_ROW:], ())
 
 
 def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None]) -> list[Run]:
@@ -96,8 +101,16 @@ def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, byte
         elif op in (Op.SCHEMA, Op.CHANNEL):
             define(op, data[begin:end])
     for times, _ in found.values():
-        _check_times(file, chunk, min(times), max(times))
-    return [Run(c, np.array(times, dtype=np.int64), None, tuple(p)) for c, (times, p) in sorted(found.items())]
+        _check_time(file, chunk, max(times))
+    return [_run(channel, times, payloads) for channel, (times, payloads) in sorted(found.items())]
+
+
+def _run(channel: int, times: list[int], payloads: list[bytes]) -> Run:
+    length = len(payloads[0])
+    if not length or any(len(payload) != length for payload in payloads):
+        return Run(channel, np.array(times, dtype=np.int64), None, tuple(payloads))
+    rows = np.frombuffer(b"".join(payloads), dtype=np.uint8).reshape(-1, length)
+    return Run(channel, np.array(times, dtype=np.int64), rows, ())
 
 
 def records(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
@@ -114,9 +127,10 @@ def records(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
         yield op, begin, at
 
 
-def _check_times(file: str, chunk: Chunk, first: int, last: int) -> None:
-    if last >= 2**63 or first < chunk.start_time or last > chunk.end_time:
-        raise _damage(file, chunk, "holds a message outside its time range")
+def _check_time(file: str, chunk: Chunk, last: int) -> None:
+    if last >= 2**63:
+        rule = f"at {last} ns; times are read up to {2**63 - 1} ns, in the year 2262"
+        raise RecordingError(file, f"the chunk at byte {chunk.begin} holds a message {rule}")
 
 
 def _damage(file: str, chunk: Chunk, reason: str) -> RecordingError:

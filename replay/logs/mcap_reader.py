@@ -1,8 +1,11 @@
 """MCAP files opened with every checksum verified, and salvaged when they were cut.
 
 The library's seekable reader checks chunks only: flipped bits in the rest of a file pass in silence. Here one pass
-over the file checks the data section, the summary, attachments and the preamble, and a chunk is checked whenever it
-is unpacked, so that damage anywhere is an error and never a different number.
+over the file checks the data section, the summary and attachments, and a chunk is checked whenever it is unpacked, so
+that damage which any checksum in the file covers is an error and never a different number.
+
+Whoever wrote a file, what its format allows is read: schemas and channels that stand in chunks alone, records that go
+on after what is known of them, kinds of records that are not known, channels without a schema.
 """
 
 from __future__ import annotations
@@ -11,18 +14,22 @@ import io
 import stat
 import struct
 import zlib
+from collections import deque
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from replay.errors import RecordingError
+from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.logs.loss import Loss
-from replay.logs.mcap_chunks import Run, mixed_runs, records, regular_run, unpack
+from replay.logs.mcap_chunks import MESSAGE_ROW, Run, mixed_runs, regular_run, unpack
 from replay.logs.mcap_records import (
+    DATA_SECTION,
     MAGIC,
+    MAX_CHUNK,
     MAX_RECORD,
-    MESSAGE_HEAD,
     PREAMBLE,
+    PRIVATE,
     RECORD_HEAD,
     Attachment,
     Channel,
@@ -30,11 +37,14 @@ from replay.logs.mcap_records import (
     Cursor,
     Op,
     Schema,
+    check_crc,
+    crc_after,
     read_attachment,
     read_channel,
     read_chunk,
     read_schema,
 )
+from replay.logs.mcap_summary import read_summary
 
 
 class McapLog:
@@ -49,38 +59,32 @@ class McapLog:
         attachments: in the order of the file.
         metadata: name and values, in the order of the file.
         message_counts: messages by channel id as the file's statistics say, or None.
-        checked: whether the file carries every checksum that the format provides for.
+        preamble_holds: whether everything before the first chunk is there and as `replay` wrote it; it decides where
+            the data section has no end, and so no checksum. A file that another tool has written anew says no.
         loss: what was lost when the file was salvaged, else None.
     """
 
     def __init__(self, path: str | Path, *, salvage: bool = False, data: bytes | None = None) -> None:
         """Walk and verify a file; with `salvage`, keep everything before the first damage instead of refusing it.
 
-        Given its bytes as `data`, the file itself is not touched; `path` is its name in messages then.
+        Given its bytes as `data`, the file itself is not touched; `path` is its name in messages then. With `salvage`
+        every chunk is unpacked, so that no damage is left to be found later.
 
         Raises:
             RecordingError: the file cannot be read, is not an MCAP file, or is damaged or cut (without `salvage`).
         """
         self.path = Path(path)
-        self.library = ""
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.chunks: list[Chunk] = []
-        self.attachments: list[Attachment] = []
-        self.metadata: list[tuple[str, dict[str, str]]] = []
-        self.message_counts: dict[int, int] | None = None
-        self.checked = True
-        self.loss: Loss | None = None
         self._file = str(path)
         self._salvage = salvage
         self._hint = "" if salvage or data is not None else "; `replay info` and `replay export` salvage what is whole"
+        self._forget()
         try:
             self._size = _size_of(self.path) if data is None else len(data)
             self._stream: BinaryIO = self.path.open("rb") if data is None else io.BytesIO(data)
         except OSError as error:
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
         try:
-            self._walk()
+            self._open()
         except OSError as error:
             self.close()
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
@@ -88,10 +92,31 @@ class McapLog:
             self.close()
             raise
 
-    @property
-    def preamble_checked(self) -> bool:
-        """Whether everything before the first chunk is there and as it was written; so in any whole recording."""
-        return any(name == PREAMBLE for name, _ in self.metadata)
+    def _forget(self) -> None:
+        """Begin anew: nothing is read."""
+        self.library = ""
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.chunks: list[Chunk] = []
+        self.attachments: list[Attachment] = []
+        self.metadata: list[tuple[str, dict[str, str]]] = []
+        self.message_counts: dict[int, int] | None = None
+        self.preamble_holds = False
+        self.loss: Loss | None = None
+
+    def _open(self) -> None:
+        head = self._bytes_at(0, min(self._size, LARGEST_POINTER))
+        if is_lfs_pointer(head):
+            raise RecordingError(self._file, LFS_POINTER)
+        if not head.startswith(MAGIC):
+            raise RecordingError(self._file, "is not an MCAP file (it does not begin as one)")
+        try:
+            self._walk()
+        except RecordingError as error:
+            if not self._salvage or not self.library:
+                raise
+            self._forget()  # what seemed whole may have been read past the damage
+            self._walk_to(error)
 
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
@@ -111,7 +136,7 @@ class McapLog:
         if self.message_counts is None or self.loss is not None:
             return None
         count = self.message_counts.get(channel, 0)
-        if count > sum(chunk.uncompressed_size for chunk in self.chunks) // (RECORD_HEAD + MESSAGE_HEAD):
+        if count > sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in self.chunks) // MESSAGE_ROW:
             raise self._damage(f"its statistics claim {count} messages of one topic, more than it holds")
         return count
 
@@ -151,29 +176,46 @@ class McapLog:
         self.close()
 
     def _walk(self) -> None:
-        if self._stream.read(len(MAGIC)) != MAGIC:
-            raise RecordingError(self._file, "is not an MCAP file (it does not begin as one)")
-        at, crc, finished = len(MAGIC), zlib.crc32(MAGIC), False
+        """Read the whole file; RecordingError when it is damaged."""
+        at, crc = len(MAGIC), zlib.crc32(MAGIC)
+        while True:
+            op, content, end = self._next_record(at)
+            if op == Op.DATA_END:
+                stored = Cursor(self._file, "the end of the data", content).unsigned(4)
+                check_crc(self._file, stored, crc, "data section")
+                self._summary(end)
+                break
+            self._data_record(op, content, at, crc)
+            crc = crc_after(op, content, crc)
+            at = end
+        self._define_from_chunks()
+
+    def _walk_to(self, damage: RecordingError) -> None:
+        """Read what comes before the first damage, when the file as a whole is known to be damaged."""
+        at, crc = len(MAGIC), zlib.crc32(MAGIC)
         try:
-            while not finished:
+            while True:
                 op, content, end = self._next_record(at)
                 if op == Op.DATA_END:
-                    self._check_crc(Cursor(self._file, "the end of the data", content).unsigned(4), crc, "data section")
-                    self._summary(end)
-                    finished = True
-                elif op == Op.FOOTER:
-                    raise self._damage(f"the data section has no end, at byte {at}")
-                else:
-                    self._data_record(op, content, at + RECORD_HEAD, crc)
-                    crc = zlib.crc32(content, zlib.crc32(struct.pack("<BQ", op, len(content)), crc))
+                    break
+                if op not in DATA_SECTION and (op < PRIVATE or self.preamble_holds):
+                    raise self._damage(f"the record at byte {at} is of an unknown kind")
+                self._data_record(op, content, at, crc)
+                crc = crc_after(op, content, crc)
                 at = end
-            if not self.channels and self.chunks:
-                for chunk in self.chunks:  # a file that does not repeat its channels in the summary
-                    list(self.runs(chunk))
         except RecordingError as error:
-            if not self._salvage or not self.library:
-                raise
-            self.loss = Loss(error.reason, self._size - at)
+            damage = error
+        self.loss = Loss(damage.reason, self._size - at)
+
+    def _define_from_chunks(self) -> None:
+        """Unpack the chunks that may hold the schemas and channels which the rest of the file does not have."""
+        for chunk in self.chunks:
+            found = [self.channels.get(number) for number in chunk.channels]
+            if not chunk.loose and not (found and all(c and c.schema_id in (0, *self.schemas) for c in found)):
+                deque(self.runs(chunk), maxlen=0)
+        for channel in self.channels.values():
+            if channel.schema_id and channel.schema_id not in self.schemas:
+                raise self._damage(f"channel {channel.topic!r} refers to a schema that is not there")
 
     def _next_record(self, at: int) -> tuple[int, bytes, int]:
         head = self._bytes_at(at, RECORD_HEAD) if at + RECORD_HEAD <= self._size else b""
@@ -190,9 +232,10 @@ class McapLog:
             )
         return op, self._bytes_at(at + RECORD_HEAD, length), at + RECORD_HEAD + length
 
-    def _data_record(self, op: int, content: bytes, begin: int, crc: int) -> None:
-        cursor = Cursor(self._file, f"the record at byte {begin - RECORD_HEAD}", content)
-        if begin == len(MAGIC) + RECORD_HEAD and op != Op.HEADER:
+    def _data_record(self, op: int, content: bytes, at: int, crc: int) -> None:
+        """Take a record of the data section that begins at `at`; `crc` is that of everything before it."""
+        cursor, begin = Cursor(self._file, f"the record at byte {at}", content), at + RECORD_HEAD
+        if at == len(MAGIC) and op != Op.HEADER:
             raise self._damage("its first record is not a header")
         if op == Op.HEADER:
             cursor.text()
@@ -201,91 +244,60 @@ class McapLog:
             self._define(op, content)
         elif op == Op.CHUNK:
             chunk = read_chunk(cursor, begin)
-            self.checked = self.checked and chunk.uncompressed_crc != 0
             if self._salvage:
-                list(self.runs(chunk))
+                deque(self.runs(chunk), maxlen=0)
             self.chunks.append(chunk)
         elif op == Op.MESSAGE:
-            self._loose_message(begin - RECORD_HEAD, len(content) + RECORD_HEAD)
+            self._known(cursor.unsigned(2))
+            self._loose_message(at, len(content) + RECORD_HEAD)
         elif op == Op.ATTACHMENT:
             attachment = read_attachment(cursor, begin)
-            stored = int.from_bytes(content[-4:], "little")
-            self._check_crc(stored, zlib.crc32(content[:-4]), f"attachment {attachment.name!r}")
+            stored = cursor.unsigned(4)
+            check_crc(self._file, stored, zlib.crc32(content[: cursor.at - 4]), f"attachment {attachment.name!r}")
             self.attachments.append(attachment)
         elif op == Op.METADATA:
             name, values = cursor.text(), cursor.mapping()
             if name == PREAMBLE:
-                self._check_crc(int(values.get("crc32", "")) if values.get("crc32", "").isdecimal() else -1, crc, name)
+                self.preamble_holds = values.get("crc32") == str(crc)
             self.metadata.append((name, values))
         elif op == Op.MESSAGE_INDEX:
             if self.chunks:
                 self.chunks[-1].channels.append(cursor.unsigned(2))
-        elif self._salvage:
-            raise self._damage(f"the record at byte {begin - RECORD_HEAD} is of an unknown kind")
+        elif op == Op.FOOTER:
+            raise self._damage(f"the data section has no end, at byte {at}")
+        elif op == 0:
+            raise self._damage(f"the record at byte {at} is of no kind: bytes are missing there")
 
     def _loose_message(self, begin: int, size: int) -> None:
         """Take messages outside chunks as an unpacked chunk without a checksum of its own."""
-        if self.chunks and self.chunks[-1].uncompressed_crc == 0 and not self.chunks[-1].compression:
-            last = self.chunks[-1]
-            if last.begin + last.compressed_size == begin and last.end_time == 2**64 - 1:
-                begin, size = last.begin, last.compressed_size + size
-                self.chunks.pop()
-        self.chunks.append(Chunk(0, 2**64 - 1, size, 0, "", begin, size))
-        self.checked = False
+        last = self.chunks[-1] if self.chunks else None
+        if last is not None and last.follows_on(begin) and last.compressed_size + size <= MAX_CHUNK:
+            self.chunks.pop()
+            begin, size = last.begin, last.compressed_size + size
+        self.chunks.append(Chunk(size, 0, "", begin, size, loose=True))
 
     def _summary(self, start: int) -> None:
         size = self._size - len(MAGIC) - start
         if size < 0 or size > MAX_RECORD or self._bytes_at(self._size - len(MAGIC), len(MAGIC)) != MAGIC:
             raise self._damage("its end is missing or is not that of an MCAP file")
-        data = self._bytes_at(start, size)
-        footer = b""
-        for op, begin, end in records(self._file, data):
-            if footer:
-                raise self._damage("something follows its footer")
-            if op == Op.FOOTER:
-                footer = data[begin:end]
-            elif op in (Op.SCHEMA, Op.CHANNEL):
-                self._define(op, data[begin:end])
-            elif op == Op.STATISTICS:
-                self._statistics(data[begin:end])
-        if len(footer) != 20:
-            raise self._damage("its footer is missing")
-        summary_start, _, crc = struct.unpack("<QQI", footer)
-        if summary_start not in (start, 0) or (summary_start == 0 and size != RECORD_HEAD + 20):
-            raise self._damage("its footer does not point to its summary")
-        self._check_crc(crc, zlib.crc32(data[:-4]), "summary")
-
-    def _statistics(self, content: bytes) -> None:
-        cursor = Cursor(self._file, "the statistics", content)
-        cursor.take(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8)
-        end = cursor.unsigned(4) + cursor.at
-        self.message_counts = {}
-        while cursor.at < end:
-            channel = cursor.unsigned(2)
-            self.message_counts[channel] = cursor.unsigned(8)
+        self.message_counts = read_summary(self._file, self._bytes_at(start, size), start, self._define)
 
     def _define(self, op: int, content: bytes) -> None:
         cursor = Cursor(self._file, "a schema or channel", content)
         if op == Op.SCHEMA:
             number, schema = read_schema(cursor)
-            if number == 0 or self.schemas.setdefault(number, schema) != schema:
+            if number == 0:
+                raise self._damage(f"schema {schema.name!r} has the number 0, which stands for none")
+            if self.schemas.setdefault(number, schema) != schema:
                 raise self._damage(f"schema {number} is defined twice, differently")
         else:
             channel = read_channel(cursor)
-            if channel.schema_id and channel.schema_id not in self.schemas:
-                raise self._damage(f"channel {channel.topic!r} refers to a schema that is not there")
             if self.channels.setdefault(channel.id, channel) != channel:
                 raise self._damage(f"channel {channel.id} is defined twice, differently")
 
     def _known(self, channel: int) -> None:
         if channel not in self.channels:
             raise self._damage(f"a message belongs to channel {channel}, which is not defined")
-
-    def _check_crc(self, stored: int, computed: int, what: str) -> None:
-        if stored == 0:
-            self.checked = False
-        elif stored != computed:
-            raise self._damage(f"the checksum of its {what} is wrong")
 
     def _bytes_at(self, begin: int, size: int) -> bytes:
         self._stream.seek(begin)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import struct
+import zlib
 from dataclasses import dataclass, field
 
 from replay.errors import RecordingError
@@ -12,6 +14,10 @@ RECORD_HEAD = 9
 """Bytes before a record's content: opcode (1) and content length (8)."""
 MESSAGE_HEAD = 22
 """Bytes of a message record's content before its data: channel (2), sequence (4), log time (8), publish time (8)."""
+FOOTER_BYTES = 20
+"""Bytes of the footer's content: start of the summary (8), start of its offsets (8), checksum (4)."""
+PRIVATE = 0x80
+"""Opcodes from here on are an application's own."""
 MAX_RECORD = 1 << 30
 """Largest record [bytes] that is read or written; a larger length is damage or an attack."""
 MAX_CHUNK = 1 << 28
@@ -20,7 +26,7 @@ PREAMBLE = "preamble"
 """Name of our metadata record that closes the part before the first chunk: `crc32` of all bytes before it.
 
 The data section's checksum comes last in a file, so a file that was cut has none; chunks have their own, and this
-covers schemas, channels, metadata and attachments.
+covers schemas, channels, metadata and attachments there.
 """
 
 
@@ -42,6 +48,10 @@ class Op(enum.IntEnum):
     METADATA_INDEX = 0x0D
     SUMMARY_OFFSET = 0x0E
     DATA_END = 0x0F
+
+
+DATA_SECTION = frozenset(op for op in Op if op <= Op.MESSAGE_INDEX or op in (Op.ATTACHMENT, Op.METADATA, Op.DATA_END))
+"""What may stand before the summary; the footer is among it because its standing there is told in words of its own."""
 
 
 @dataclass(frozen=True)
@@ -68,17 +78,21 @@ class Channel:
 class Chunk:
     """A compressed run of messages; the data lie at `begin` in the file.
 
-    `channels` are the ids that the message indexes after the chunk name; empty when there are none.
+    `channels` are the ids that the message indexes after the chunk name; empty when there are none. A `loose` one is
+    no chunk of the file, but messages that stand outside of any, one after another.
     """
 
-    start_time: int
-    end_time: int
     uncompressed_size: int
     uncompressed_crc: int
     compression: str
     begin: int
     compressed_size: int
     channels: list[int] = field(default_factory=list)
+    loose: bool = False
+
+    def follows_on(self, begin: int) -> bool:
+        """Return whether a message outside chunks that begins there belongs to these."""
+        return self.loose and self.begin + self.compressed_size == begin
 
 
 @dataclass(frozen=True)
@@ -146,19 +160,31 @@ def read_channel(cursor: Cursor) -> Channel:
 
 def read_chunk(cursor: Cursor, begin: int) -> Chunk:
     """Return a chunk record's content without its data; the record's content begins at `begin` in the file."""
-    start, end, size, crc = cursor.unsigned(8), cursor.unsigned(8), cursor.unsigned(8), cursor.unsigned(4)
+    cursor.take(16)  # times of the first and the last message
+    size, crc = cursor.unsigned(8), cursor.unsigned(4)
     compression = cursor.text()
     compressed = cursor.unsigned(8)
-    chunk = Chunk(start, end, size, crc, compression, begin + cursor.at, compressed)
+    chunk = Chunk(size, crc, compression, begin + cursor.at, compressed)
     cursor.take(compressed)
     return chunk
 
 
 def read_attachment(cursor: Cursor, begin: int) -> Attachment:
-    """Return an attachment record's content without data and checksum, which are the record's last 4 bytes."""
+    """Return an attachment record's content without its data; the cursor stands at the checksum then."""
     cursor.take(16)  # log and creation time
     name, media_type = cursor.text(), cursor.text()
     size = cursor.unsigned(8)
     attachment = Attachment(name, media_type, begin + cursor.at, size)
-    cursor.take(size + 4)
+    cursor.take(size)
     return attachment
+
+
+def crc_after(op: int, content: bytes, crc: int) -> int:
+    """Return the checksum of everything up to a record and the record."""
+    return zlib.crc32(content, zlib.crc32(struct.pack("<BQ", op, len(content)), crc))
+
+
+def check_crc(file: str, stored: int, computed: int, what: str) -> None:
+    """Raise RecordingError when a checksum is there, which 0 says that it is not, and is not the computed one."""
+    if stored not in (0, computed):
+        raise RecordingError(file, f"damaged: the checksum of its {what} is wrong")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -111,6 +112,16 @@ class Events(Sequence[Event]):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def in_order(self, layout: Layout) -> Events:
+        """Return these in the order in which they are found: by time, and at one time by kind and name.
+
+        A file that another tool has written anew may hold those of one time in any order.
+        """
+        place = {(kind, name): at for at, (kind, name, _) in enumerate(_subjects(layout))}
+        ranks = [place.get((what.kind, what.subject), len(place)) for what in self.transitions]
+        order = np.lexsort((np.array(ranks, dtype=np.int64)[self.code], self.time))
+        return Events(self.time[order], self.frame[order], self.code[order], self.transitions)
+
     def count_missing_in(self, other: Events) -> int:
         """Return how many of these events the other does not have."""
         mine, theirs = (rows.view("i8,i8,i8")[:, 0] for rows in _table(self, other))
@@ -141,20 +152,14 @@ class EventFinder:
     """Finds the events of blocks given in order; what is already so in the first frame begins there."""
 
     def __init__(self, layout: Layout) -> None:
-        groups = [
-            ("/collision", layout.pairs, ("bounds", "contact", "undecided")),
-            ("/distance", layout.distance_sensors, ("detection", "too close")),
-            ("/capacitive", layout.capacitive_sensors, ("saturation",)),
-        ]
         self._first: dict[str, int] = {}
         self._last: dict[str, Flags] = {}
-        self._subjects: list[tuple[str, str, str]] = []
-        for topic, names, kinds in groups:
-            for kind in kinds:
-                self._first[kind] = 2 * len(self._subjects)
-                self._last[kind] = np.zeros(len(names), dtype=np.bool_)
-                for name in names:
-                    self._subjects.append((kind, name, topic if topic == "/collision" else f"{topic}/{name}"))
+        self._subjects = list(_subjects(layout))
+        for at, (kind, _, _) in enumerate(self._subjects):
+            self._first.setdefault(kind, 2 * at)
+        counts = Counter(kind for kind, _, _ in self._subjects)
+        for kind in SEVERITY:
+            self._last[kind] = np.zeros(counts[kind], dtype=np.bool_)
 
     def find(self, block: FrameBlock) -> Events:
         """Return the events of the next block, by frame, and within a frame by kind and name."""
@@ -177,6 +182,19 @@ class EventFinder:
     def _transition(self, number: int) -> Transition:
         kind, subject, source = self._subjects[number // 2]
         return Transition(kind, number % 2 == 1, subject, source)
+
+
+def _subjects(layout: Layout) -> Iterator[tuple[str, str, str]]:
+    """Yield kind, name and topic of whatever may begin or end, in the order in which it is told."""
+    groups = [
+        ("/collision", layout.pairs, ("bounds", "contact", "undecided")),
+        ("/distance", layout.distance_sensors, ("detection", "too close")),
+        ("/capacitive", layout.capacitive_sensors, ("saturation",)),
+    ]
+    for topic, names, kinds in groups:
+        for kind in kinds:
+            for name in names:
+                yield kind, name, topic if topic == "/collision" else f"{topic}/{name}"
 
 
 def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:

@@ -1,4 +1,4 @@
-"""Recordings as tables for other programs: CSV, JSON or Parquet, with the unit in each column's name.
+"""Recordings, and logs of others, as tables: CSV, JSON or Parquet, with the unit in each column's name.
 
 Numbers keep all their digits. What is not a number stays so: `nan`, `inf` and `-inf` in CSV, the texts "NaN",
 "Infinity" and "-Infinity" in JSON (as in protobuf's JSON), NaN and infinities in Parquet.
@@ -7,9 +7,10 @@ Numbers keep all their digits. What is not a number stays so: `nan`, `inf` and `
 from __future__ import annotations
 
 import fnmatch
+import functools
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 
 from replay.collision.columns import Level
 from replay.errors import InvalidValue
+from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
+from replay.logs.tables import topic_table
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
 from replay.recording.topics import WORLD
@@ -58,21 +61,23 @@ def tables(recording: Recording) -> dict[str, Table]:
 
 
 def export(
-    recording: Recording,
+    recording: Recording | McapLog,
     directory: str | Path,
     *,
     format: Format,
     topics: Collection[str] = ("*",),
     overwrite: bool = False,
+    tell: Callable[[str], object] = str,
 ) -> tuple[Path, ...]:
-    """Write topics of a recording into a directory.
+    """Write topics of a recording, or of any other log, into a directory.
 
     Args:
-        recording: what `read` returned.
+        recording: what `read` returned; or a log of others, whose topics become tables as of `logs.tables`.
         directory: where; made when it is not there.
         format: "csv" and "parquet" give a file a topic, NAME.TOPIC.csv; "json" gives one file, NAME.json.
         topics: globs on topic names, such as "/distance/*".
         overwrite: replace files that exist.
+        tell: is called with what a reader of the tables should know: topics whose messages are bytes to `replay`.
 
     Returns:
         The files written.
@@ -84,25 +89,37 @@ def export(
     """
     if format not in FORMATS:
         raise InvalidValue("format", format, f"must be one of {', '.join(FORMATS)}")
-    all_tables = tables(recording)
+    sources = _sources(recording, tell)
     for pattern in topics:
-        if not fnmatch.filter(all_tables, pattern):
-            raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(all_tables))}")
-    chosen = {
-        topic: table
-        for topic, table in sorted(all_tables.items())
-        if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)
-    }
+        if not fnmatch.filter(sources, pattern):
+            raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
+    chosen = [topic for topic in sorted(sources) if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)]
     directory = Path(directory)
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
     if format == "json":
-        return (write_file(directory / f"{stem}.json", _json(recording, chosen), overwrite=overwrite),)
-    names = _file_names(stem, sorted(all_tables), format)
+        document = _json(recording, {topic: sources[topic]() for topic in chosen})
+        return (write_file(directory / f"{stem}.json", document, overwrite=overwrite),)
+    names = _file_names(stem, sorted(sources), format)
     encode = _csv if format == "csv" else _parquet
     return tuple(
-        write_file(directory / names[topic], encode(recording, table), overwrite=overwrite)
-        for topic, table in chosen.items()
+        write_file(directory / names[topic], encode(recording, sources[topic]()), overwrite=overwrite)
+        for topic in chosen
     )
+
+
+def _sources(recording: Recording | McapLog, tell: Callable[[str], object]) -> dict[str, Callable[[], Table]]:
+    """Return what makes the table of each topic: of a log of others, no two are in memory at once."""
+    if not isinstance(recording, McapLog):
+        return {topic: functools.partial(dict, table) for topic, table in tables(recording).items()}
+    log = recording
+
+    def table(topic: str) -> Table:
+        found, reason = topic_table(log, topic)
+        if reason:
+            tell(f"{log.path}: topic {topic!r} is written as bytes: {reason}")
+        return found
+
+    return {topic: functools.partial(table, topic) for topic in {channel.topic for channel in log.channels.values()}}
 
 
 def _collision(recording: Recording) -> Table:
@@ -171,15 +188,17 @@ def _file_names(stem: str, topics: Collection[str], extension: str) -> dict[str,
     return names
 
 
-def _arrow(recording: Recording, table: Mapping[str, Column]) -> Any:
+def _arrow(recording: Recording | McapLog, table: Mapping[str, Column]) -> Any:
     import pyarrow
 
-    metadata = {RECORD: json.dumps(recording.provenance.to_metadata(), sort_keys=True)}
+    metadata = {}
+    if isinstance(recording, Recording):
+        metadata = {RECORD: json.dumps(recording.provenance.to_metadata(), sort_keys=True)}
     columns = {name: pyarrow.array(np.ascontiguousarray(values)) for name, values in table.items()}
     return pyarrow.table(columns, metadata=metadata)
 
 
-def _csv(recording: Recording, table: Mapping[str, Column]) -> bytes:
+def _csv(recording: Recording | McapLog, table: Mapping[str, Column]) -> bytes:
     import pyarrow
     import pyarrow.csv
 
@@ -189,7 +208,7 @@ def _csv(recording: Recording, table: Mapping[str, Column]) -> bytes:
     return data
 
 
-def _parquet(recording: Recording, table: Mapping[str, Column]) -> bytes:
+def _parquet(recording: Recording | McapLog, table: Mapping[str, Column]) -> bytes:
     import pyarrow
     import pyarrow.parquet
 
@@ -199,13 +218,16 @@ def _parquet(recording: Recording, table: Mapping[str, Column]) -> bytes:
     return data
 
 
-def _json(recording: Recording, chosen: Mapping[str, Table]) -> bytes:
-    provenance = {key: json.loads(value) for key, value in recording.provenance.to_metadata().items()}
+def _json(recording: Recording | McapLog, chosen: Mapping[str, Table]) -> bytes:
+    provenance = lost = None
+    if isinstance(recording, Recording):
+        provenance = {key: json.loads(value) for key, value in recording.provenance.to_metadata().items()}
+        lost = recording.lost_frames
     topics = {
         topic: {name: [_plain(value) for value in values.tolist()] for name, values in table.items()}
         for topic, table in chosen.items()
     }
-    document = {"provenance": provenance, "lost_frames": recording.lost_frames, "topics": topics}
+    document = {"provenance": provenance, "lost_frames": lost, "topics": topics}
     return json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1).encode()
 
 

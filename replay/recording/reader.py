@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
-from replay.errors import InvalidValue, RecordingError
+from replay.errors import ForeignLogError, InvalidValue, RecordingError
 from replay.logs.columns import Topic, read_topics
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
@@ -106,7 +106,8 @@ def read(path: str | Path, *, salvage: bool = False, topics: Collection[str] | N
             alone; `layout` then names what was read. All when None.
 
     Raises:
-        RecordingError: the file cannot be read, is not a recording, has another format version, or is damaged
+        ForeignLogError: the file is no recording.
+        RecordingError: the file cannot be read, has another format version, or is damaged
             (with `salvage`: so early that nothing can be kept).
         InvalidValue: the recording has no topic of that name.
     """
@@ -115,11 +116,26 @@ def read(path: str | Path, *, salvage: bool = False, topics: Collection[str] | N
 
 
 def read_provenance(log: McapLog) -> Provenance:
-    """Return the provenance of an opened recording; RecordingError when it has none."""
+    """Return the provenance of an opened recording.
+
+    Raises:
+        ForeignLogError: the file is not one.
+        RecordingError: its provenance cannot be used.
+    """
     found = [values for name, values in log.metadata if name == RECORD]
+    if not found and log.loss is not None and not log.channels:
+        raise RecordingError(str(log.path), f"nothing can be salvaged: {log.loss.reason}")
+    if not found:
+        raise ForeignLogError(str(log.path), f"is not a recording of replay: it has no metadata record {RECORD!r}")
     if len(found) != 1:
-        raise RecordingError(str(log.path), f"is not a recording of replay: it has no metadata record {RECORD!r}")
+        raise RecordingError(str(log.path), f"damaged: it has {len(found)} metadata records {RECORD!r}")
     return Provenance.from_metadata(str(log.path), found[0])
+
+
+def own_topics(layout: Layout) -> set[str]:
+    """Return the topics that a recording may have; those that another tool has added to it are none of them."""
+    sensors = [("/distance", layout.distance_sensors), ("/capacitive", layout.capacitive_sensors)]
+    return {FRAMES, "/tf", "/scene", EVENTS, "/collision"} | {f"{group}/{n}" for group, names in sensors for n in names}
 
 
 class _Assembly:
@@ -129,11 +145,10 @@ class _Assembly:
         self._log = log
         self._file = str(log.path)
         self._provenance = read_provenance(log)
-        if log.loss is None and not log.checked:
-            raise RecordingError(self._file, "damaged: a checksum that every recording has is missing")
-        if log.loss is not None and not log.preamble_checked:
+        if log.loss is not None and not log.preamble_holds:
             raise RecordingError(self._file, f"nothing can be salvaged: {log.loss.reason}")
-        names = {channel.topic for channel in log.channels.values()}
+        names = {channel.topic for channel in log.channels.values()} & own_topics(self._provenance.layout)
+        self._all = self._provenance.layout
         self._check_topics(names)
         chosen = names
         if wanted is not None:
@@ -269,7 +284,7 @@ class _Assembly:
     def _events(self) -> Events:
         if not self._with_events:
             return Events.none()
-        events = read_events(self._log)
+        events = read_events(self._log).in_order(self._all)
         last = int(self._frames[-1]) if len(self._frames) else -1
         return events[: int(np.searchsorted(events.time, last, side="right"))]
 

@@ -7,15 +7,16 @@ message; only the attachments that are no text are missing, and its provenance s
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from replay.errors import RecordingError
+from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
-from replay.logs.mcap_records import PREAMBLE, RECORD_HEAD, Chunk, Op
+from replay.logs.mcap_records import MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Chunk, Op
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import UNFINISHED, PartFile, write_file
 from replay.recording.provenance import sha256
@@ -56,13 +57,15 @@ def write_slim(recording: Path, target: Path, objects: Path) -> tuple[str, ...]:
                     writer.attachment(attachment.name, attachment.media_type, data)
                 else:
                     needed.append(_put(data, objects))
-            for _, schema in sorted(log.schemas.items()):
-                writer.schema(schema)
-            for _, channel in sorted(log.channels.items()):
-                writer.channel(channel.topic, channel.schema_id)
+            schemas = {number: writer.schema(schema) for number, schema in sorted(log.schemas.items())}
+            channels = {
+                number: writer.channel(channel.topic, schemas[channel.schema_id])
+                for number, channel in sorted(log.channels.items())
+                if channel.schema_id in schemas
+            }
             writer.end_preamble()
             for chunk in log.chunks:
-                _copy(log, chunk, writer)
+                _copy(log, chunk, writer, channels)
             writer.finish()
             file.commit()
         except BaseException:
@@ -81,7 +84,7 @@ def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
         RecordingError: the recording cannot be read, or a file is not there or not the one that was used.
     """
     with McapLog(recording, salvage=recording.suffix == UNFINISHED) as log:
-        if log.loss is not None and not log.preamble_checked:
+        if log.loss is not None and not log.preamble_holds:
             raise RecordingError(str(recording), f"nothing can be salvaged: {log.loss.reason}")
         provenance = read_provenance(log)
         files = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
@@ -105,25 +108,34 @@ def _object(recording: Path, name: str, digest: str) -> bytes:
     if place is None:
         raise RecordingError(str(recording), f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}")
     data = place.read_bytes()
+    if is_lfs_pointer(data):
+        raise RecordingError(str(place), LFS_POINTER)
     if sha256(data) != digest:
         raise RecordingError(str(place), "damaged: its SHA-256 is not its name")
     return data
 
 
-def _copy(log: McapLog, chunk: Chunk, writer: McapFileWriter) -> None:
+def _copy(log: McapLog, chunk: Chunk, writer: McapFileWriter, channels: Mapping[int, int]) -> None:
+    """Write the messages of a chunk under the channels' new numbers; as it is, where that is the same."""
     with log.path.open("rb") as file:
         file.seek(chunk.begin)
         packed = file.read(chunk.compressed_size)
     data = unpack(str(log.path), chunk, packed)
-    messages = np.array(list(_messages(str(log.path), data)), dtype=np.int64).reshape(-1, 3)
-    if chunk.compression != "zstd" or not len(messages) or len(np.unique(messages[:, 0])) != 1:
-        raise RecordingError(str(log.path), "is not laid out as replay writes recordings")
-    writer.packed(int(messages[0, 0]), messages[:, 1], messages[:, 2].astype(np.uint64), data, packed)
-
-
-def _messages(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield channel, log time [ns] and offset of each message record."""
-    for op, begin, _ in records(file, data):
-        if op == Op.MESSAGE:
-            channel, _, time = struct.unpack_from("<HIQ", data, begin)
-            yield channel, time, begin - RECORD_HEAD
+    found: dict[int, list[tuple[int, int, int, int]]] = {}
+    only_messages = True
+    for op, begin, end in records(str(log.path), data):
+        if op == Op.MESSAGE and end - begin >= MESSAGE_HEAD:
+            channel, sequence, time = struct.unpack_from("<HIQ", data, begin)
+            found.setdefault(channel, []).append((begin, end, sequence, time))
+        only_messages = only_messages and op == Op.MESSAGE
+    ours = only_messages and len(found) == 1 and chunk.compression == "zstd"
+    for number, messages in found.items():
+        if number not in channels:
+            continue
+        begins, ends, sequences, times = zip(*messages, strict=True)
+        if ours and channels[number] == number:
+            offsets = np.array(begins, dtype=np.uint64) - np.uint64(RECORD_HEAD)
+            writer.packed(number, np.array(times, dtype=np.int64), offsets, data, packed)
+        else:
+            bodies = [data[begin + MESSAGE_HEAD : end] for begin, end in zip(begins, ends, strict=True)]
+            writer.messages(channels[number], times, sequences, bodies)

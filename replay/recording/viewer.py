@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from replay.errors import ViewerError
+from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.recording.picture import end, viewer_binary
 
 
@@ -18,7 +19,7 @@ def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
     """Return the `.rrd` file of each recording: the file itself, or for a `.mcap` the one beside it.
 
     Raises:
-        ViewerError: a file is not there, or is neither.
+        ViewerError: a file is not there, is neither, or is a Git LFS pointer.
     """
     files = []
     for path in map(Path, recordings):
@@ -29,6 +30,9 @@ def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
         rrd = path.with_suffix(".rrd")
         if not rrd.is_file():
             raise ViewerError(f"{path}: has no {rrd.name} beside it; `replay run {path} -o DIR` makes one")
+        with rrd.open("rb") as stream:
+            if is_lfs_pointer(stream.read(LARGEST_POINTER)):
+                raise ViewerError(f"{rrd}: {LFS_POINTER}")
         files.append(rrd)
     return files
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import StringConstraints
+from pydantic import AfterValidator, StringConstraints
 
-from replay.scenario.fields import Glob, Part
+from replay.scenario.fields import Glob, Part, rejected
 from replay.scenario.units import Distance
 
 GlobPair = tuple[Glob, Glob]
+
+
+def _reaches(margin: float) -> float:
+    if margin == 0.0:
+        raise rejected("must be > 0 m; with model.collision.clearance: never no clearance is computed")
+    return margin
 
 
 class Disable(Part):
@@ -26,7 +32,7 @@ class Collision(Part):
 
     pairs: Literal["all", "none"] = "all"
     """"all": every pair of shapes on different links that are not joined by a joint; "none": no pair."""
-    margin: Distance = 0.05
+    margin: Annotated[Distance, AfterValidator(_reaches)] = 0.05
     """Clearances up to this one are computed [m] (model.collision.clearance: near)."""
     disable: tuple[Disable, ...] = ()
     """Pairs that are left out, each with its reason."""

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from replay.errors import Problem
+from replay.scenario import decimal_comma
 from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
 from replay.scenario.node import Node
 from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
@@ -104,7 +105,8 @@ def _rule(kind: str, context: dict[str, Any], message: str, node: Node | None) -
         case "too_short":
             return f"must have at least {context['min_length']} entr{'y' if context['min_length'] == 1 else 'ies'}"
         case "too_long":
-            return f"needs {context['max_length']} entries, not {context['actual_length']}"
+            items = node.sequence if node is not None else []
+            return f"needs {context['max_length']} entries, not {context['actual_length']}{decimal_comma.hint(items)}"
         case "greater_than_equal":
             return f"must be at least {context['ge']}"
         case "less_than_equal":

@@ -33,7 +33,6 @@ PATH = ("motion", "recorded")
 _TABLES = ("csv", "tsv")
 _OF_TABLES = ("time", "separator", "decimal")
 _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
-_LFS = b"version https://git-lfs.github.com/spec/"
 
 
 @dataclass
@@ -116,8 +115,6 @@ class _Reader:
         except SourceRule as error:
             return self._read_folder(shown, error)
         digest = hashlib.sha256(data).hexdigest()
-        if data.startswith(_LFS):
-            raise Unusable((*PATH, "file"), "is a pointer of Git LFS, not the log itself; get it with: git lfs pull")
         kind = self._name.rpartition(".")[2].lower()
         messages = is_message_log(data) or kind in ("mcap", "bag", "db3")
         if not messages and kind not in (*_TABLES, *ENDINGS):

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from replay.errors import Problem
+from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.scenario.node import Node, Place
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ PACKAGE: Final = "package://"
 MAX_FILE_BYTES: Final = 1 << 30
 
 _INSTALL: Final = {"pyskindose": "pip install --no-deps pyskindose"}
-"""How to get a package when `pip install NAME` is not the best way."""
+"""How to get the packages that are known; what else brings a package of some name, only its user knows."""
 
 
 class SourceRule(Exception):
@@ -224,7 +225,10 @@ def _read(path: Path) -> bytes:
         size = path.stat().st_size
         if size > MAX_FILE_BYTES:
             raise SourceRule(f"has {size} bytes; at most {MAX_FILE_BYTES} are read")
-        return path.read_bytes()
+        data = path.read_bytes()
+        if is_lfs_pointer(data):
+            raise SourceRule(LFS_POINTER)
+        return data
     except FileNotFoundError:
         if path.is_symlink():
             raise SourceRule("is a link to a file that does not exist") from None
@@ -253,8 +257,13 @@ def _in_package(name: str) -> Path:
     except (ImportError, ValueError):
         spec = None
     if spec is None:
-        install = _INSTALL.get(package, f"pip install {package}")
-        raise SourceRule(f"needs the Python package {package!r}, which is not installed; get it with: {install}")
+        missing = f"needs the Python package {package!r}, which is not installed"
+        if package in _INSTALL:
+            raise SourceRule(f"{missing}; get it with: {_INSTALL[package]}")
+        raise SourceRule(
+            f"{missing}; install what brings it or, where {package!r} is a ROS package, copy the file into the"
+            " scenario's folder and write its path"
+        )
     folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
     for folder in folders:
         file = folder / path

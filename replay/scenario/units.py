@@ -16,6 +16,8 @@ from typing import Annotated, Any, Final
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
+from replay.scenario import decimal_comma
+
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749446, 10**61)
 _DEGREE = _PI / 180
 
@@ -99,6 +101,8 @@ def quantity_rule(text: str, wanted: tuple[Dimension, ...]) -> tuple[Fraction, D
     """
     what_works = " or ".join(dimension.what_works for dimension in wanted)
     found = _QUANTITY.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    if comma := decimal_comma.rule(text[:_MAX_LENGTH]):
+        return comma
     if found is None:
         return f"is not {wanted[0].name}; {what_works}"
     decimal, divisor, unit = found.groups()
@@ -122,7 +126,8 @@ def _exact(value: object, wanted: tuple[Dimension, ...]) -> tuple[Fraction | flo
     """Return the SI value, as an infinite float or exactly, and its dimension (None for a bare number)."""
     what_works = " or ".join(dimension.what_works for dimension in wanted)
     if isinstance(value, str):
-        result = quantity_rule(value, wanted) if wanted[0] is not NUMBER else "is text where a number belongs"
+        comma = decimal_comma.rule(value[:_MAX_LENGTH]) or "is text where a number belongs"
+        result = quantity_rule(value, wanted) if wanted[0] is not NUMBER else comma
         if isinstance(result, str):
             raise _rejected(result)
         return result

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from replay.errors import Problem
+from replay.scenario import decimal_comma
 from replay.scenario.node import Node, Place, Scalar
 
 __all__ = ["MAX_BYTES", "MAX_DEPTH", "MAX_DIGITS", "MAX_NODES", "Node", "parse"]
@@ -201,11 +202,20 @@ class _Builder:
 
     def mapping(self, start: Any, depth: int) -> Node:
         node = Node(self.place(start), {})
+        before, end = "", -1  # of the value before: its text, and where it ends
         for event in self.events:
             if type(event).__name__ == "MappingEndEvent":
                 break
             key = self.node(event, depth + 1)
-            value = self.node(next(self.events), depth + 1)
+            below = next(self.events)
+            value = self.node(below, depth + 1)
+            empty = value.value is None and not value.text
+            if empty and end + 1 == event.start_mark.index and decimal_comma.parted(before, key.text):
+                whose = next(reversed(node.keys), "a value")
+                self.report(event, f"{whose} = {before},{key.text} has a decimal comma; write {before}.{key.text}")
+                self.whole = False
+                continue
+            before, end = value.text, below.end_mark.index
             if value.value is None and not value.text:
                 value.place = self.place(event)  # nothing is written; the scanner's mark is on a line below
             node.size += key.size + value.size

@@ -124,3 +124,16 @@ def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
     assert failing_since(nights, "a") == "day 2"
     assert failing_since(nights, "b") is None
     assert failing_since([], "a") is None
+
+
+def test_a_pointer_of_git_lfs_in_place_of_a_mesh_or_a_recording_is_told_as_one(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a21\nsize 12345\n"
+    (mesh,) = (tmp_path / "objects").iterdir()
+    mesh.write_text(pointer)
+    with pytest.raises(RecordingError, match=f"{mesh.name}: is a Git LFS pointer"):
+        attached_files(baseline.recording("a"))
+    baseline.recording("a").write_text(pointer)
+    with pytest.raises(RecordingError, match=r"a.mcap: is a Git LFS pointer.*git lfs pull"):
+        diff(baseline.recording("a"), run / "a" / "a.mcap")

@@ -58,6 +58,27 @@ def test_a_recording_runs_again_from_its_attachments_alone(recorded, tmp_path):
     assert (tmp_path / "again" / "swing" / "swing.mcap").read_bytes() == moved.read_bytes()
 
 
+def test_a_file_that_is_not_valid_is_told_and_the_others_are_run(tmp_path, capsys):
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.yaml").write_text(
+            SCENARIO.replace("EXPECTED", "never").replace("name: swing", f"name: {name}", 1)
+        )
+    (tmp_path / "broken.yaml").write_text("version: 1\nname: [broken\n")
+    (tmp_path / "lost.yml").symlink_to("nowhere.yml")
+    out = tmp_path / "out"
+    command = ["run", str(tmp_path), "-o", str(out), "--no-rrd"]
+    assert run(command) is ExitCode.INVALID
+    text = capsys.readouterr().out
+    assert "broken: failed\n  " in text and f"{tmp_path}/broken.yaml:" in text and "not YAML" in text
+    assert "lost: failed" in text and "is a link to a file that does not exist" in text
+    assert "4 scenarios: 2 passed, 2 failed (broken, lost)" in text
+    assert (out / "first" / "first.mcap").is_file() and (out / "second" / "second.mcap").is_file()
+    assert json.loads((out / "run.json").read_text())["scenarios"]["broken"]["status"] == "failed"
+    (out / "broken" / "broken.mcap").write_bytes(b"an earlier one")
+    assert run([*command, "--select", "broken"]) is ExitCode.INVALID  # nothing else is left: as for a single file
+    assert (out / "broken" / "broken.mcap").read_bytes() == b"an earlier one"
+
+
 def test_nothing_selected_is_exit_code_5(scenario, tmp_path, capsys):
     assert run(["run", str(scenario), "--select", "tag:none", "-o", str(tmp_path)]) is ExitCode.NOTHING
     assert "nothing selected by tag:none" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import struct
 import zlib
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
 import zstandard
@@ -47,7 +48,6 @@ def test_files_of_the_library_are_read(tmp_path: Path, compression: CompressionT
     path = tmp_path / "robot.mcap"
     library_file(path, compression, **options)
     with McapLog(path) as log:
-        assert not log.checked  # the library writes no checksum of the data section by default
         topics = read_topics(log)
     joints = topics["/robot/joints"]
     assert joints.time.tolist() == list(range(100))
@@ -72,8 +72,8 @@ def text(value: str) -> bytes:
 HEADER = MAGIC + record(Op.HEADER, text("") + text("test"))
 
 
-def chunk(size: int, packed: bytes, compression: str = "zstd") -> bytes:
-    head = struct.pack("<QQQI", 0, 0, size, 1) + text(compression) + struct.pack("<Q", len(packed))
+def chunk(size: int, packed: bytes, compression: str = "zstd", crc: int = 1) -> bytes:
+    head = struct.pack("<QQQI", 0, 0, size, crc) + text(compression) + struct.pack("<Q", len(packed))
     return record(Op.CHUNK, head + packed)
 
 
@@ -116,6 +116,40 @@ def test_hostile_files_are_refused_in_one_line(tmp_path: Path, data: bytes, word
             list(log.runs(part))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("compression", "packed"),
+    [
+        ("zstd", zstandard.compress(b"")),
+        ("zstd", b""),
+        ("lz4", b""),
+        ("lz4", lz4.frame.compress(b"")),
+        ("", b""),
+    ],
+)
+def test_an_empty_chunk_is_no_damage(compression: str, packed: bytes) -> None:
+    with McapLog("empty.mcap", data=ended(HEADER + chunk(0, packed, compression, crc=0))) as log:
+        assert [list(log.runs(part)) for part in log.chunks] == [[]]
+
+
+def test_chunks_of_several_frames_and_of_frames_without_a_size_are_unpacked() -> None:
+    channel = record(Op.CHANNEL, struct.pack("<HH", 1, 0) + text("/a") + text("") + struct.pack("<I", 0))
+    messages = [record(Op.MESSAGE, struct.pack("<HIQQ", 1, 0, 0, 0) + bytes([k]) * 100) for k in range(9)]
+    data = channel + b"".join(messages)
+    streaming = zstandard.ZstdCompressor().compressobj()
+    unsized = streaming.compress(data) + streaming.flush()
+    assert zstandard.frame_content_size(unsized) == -1
+    several = zstandard.compress(data[:333]) + zstandard.compress(data[333:])
+    for packed in (unsized, several):
+        part = chunk(len(data), packed, crc=0)
+        with McapLog("frames.mcap", data=ended(HEADER + part)) as log:
+            (run,) = [run for part in log.chunks for run in log.runs(part)]
+        assert run.messages() == [bytes([k]) * 100 for k in range(9)]
+        for wrong in (len(data) - 1, len(data) + 1):
+            part = chunk(wrong, packed, crc=0)
+            with pytest.raises(RecordingError, match="does not unpack to the size"):
+                McapLog("frames.mcap", data=ended(HEADER + part))
 
 
 def test_an_absent_file_a_folder_and_a_pipe_are_refused(tmp_path: Path) -> None:

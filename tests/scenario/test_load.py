@@ -186,3 +186,10 @@ def test_every_choice_of_method_has_a_revision():
         field = methods[group].annotation.model_fields["method"]
         expected |= {f"{group}.{choice}" for choice in field.annotation.__args__}
     assert set(METHOD_REVISIONS) == expected
+
+
+def test_a_margin_of_nothing_is_refused_where_it_is_written(tmp_path):
+    path = tmp_path / "none.yaml"
+    path.write_text("version: 1\nname: a\nrate: 10\nduration: 1\nlinks: {a: {}}\ncollision: {margin: 0 cm}\n")
+    with pytest.raises(ScenarioError, match=r"none.yaml:6:21: collision.margin = '0 cm' must be > 0 m"):
+        load(path)

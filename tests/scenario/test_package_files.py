@@ -43,7 +43,8 @@ def test_a_package_is_found_and_not_imported(tmp_path, body_package):
         ("package://{}/data", "must end in .stl, .obj, .ply or .glb; save the mesh as one of these"),
         ("package://{}/../x.stl", "is not of the form package://PYTHON_PACKAGE/path/inside/it"),
         ("package://nobody_has_this/x.stl", "needs the Python package 'nobody_has_this', which is not installed; "
-         "get it with: pip install nobody_has_this"),
+         "install what brings it or, where 'nobody_has_this' is a ROS package, copy the file into the scenario's "
+         "folder and write its path"),
         ("package://this/x.stl", "names 'this', which is a single module without files"),
         ("package://x.y/x.stl", "is not of the form package://PYTHON_PACKAGE/path/inside/it"),
     ],
