@@ -44,7 +44,7 @@ class Sample:
     def positions(self) -> list[tuple[str, float]]:
         """The joints with their positions; none of a pose."""
         pairs = zip(self.names, self.values, strict=True)
-        return [(name, value) for name, value in pairs if not isinstance(value, tuple)]
+        return [(name, value) for name, value in pairs if isinstance(value, float)]
 
 
 Decoder = Callable[[bytes], list[Sample]]
