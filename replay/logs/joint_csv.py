@@ -63,7 +63,7 @@ class _Log:
         for column, heading in enumerate(table.headings):
             if heading and column != self._at:
                 series = self._series(column, heading)
-                if series is not None and len(series.time):
+                if series is not None:
                     joints[heading] = series
         if not joints:
             raise RecordingError(self._name, "has no samples of joints")
@@ -81,7 +81,7 @@ class _Log:
         )
 
     def _series(self, column: int, heading: str) -> Series | None:
-        """Return the samples of a column, or None if it holds something else than numbers and is not needed."""
+        """Return the samples of a column; None without any, or if it holds something else and is not needed."""
         values, rows = [], []
         for index in range(self._skip, len(self._times)):
             cell = self._table.rows[index][column]
@@ -94,6 +94,8 @@ class _Log:
                 return None
             values.append(value)
             rows.append(index)
+        if not rows:
+            return None
         row = np.array(rows, dtype=np.int64)
         time, position = np.array(self._times, dtype=np.int64)[row], np.array(values, dtype=np.float64) + 0.0
         first = unrepeated(time, position)

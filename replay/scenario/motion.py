@@ -128,7 +128,7 @@ class Recorded(Part):
     free: dict[Name, RecordedFrame] = Field(default_factory=dict)
     """The log's frame by link with a free joint, from transforms (TF)."""
     limit_tolerance: LimitTolerance = Dimensioned(1e-4, None)
-    """How far a measured position may be beyond a limit [rad or m]; a note says so."""
+    """How far a measured position may be beyond a limit [rad or m], 1e-4 when left out; a note says so."""
     start: Time = 0.0
     """Time [s] after the log's first sample at which the scenario begins."""
     max_gap: Time = 1.0

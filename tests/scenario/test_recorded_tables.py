@@ -44,6 +44,7 @@ GOOD = {
     "empty headings at the end": ("time,arm,,\n0,0,,\n0.400000001,0.5,,\n1,1.25,,\n", ""),
     "shorter lines below those": ("time,arm,,\n0,0\n0.400000001,0.5,\n1,1.25,,,,\n", ""),
     "a table's index without heading": (",time,arm\n0,0,0\n1,0.400000001,0.5\n2,1,1.25\n", ""),
+    "a column that is empty": ("time,arm,note\n0,0,\n0.400000001,0.5,\n1,1.25,\n", ""),
     "comments": ("# a robot\n\ntime,arm\n# begin\n0,0\n\n0.400000001,0.5\n% end\n1,1.25\n", ""),
     "headings in a comment": ("# made by numpy\n# time,arm\n0,0\n0.400000001,0.5\n1,1.25\n", ""),
     "headings of rostopic": ("%time,arm\n0,0\n400000001,0.5\n1000000000,1.25\n", "time: {unit: ns}"),
