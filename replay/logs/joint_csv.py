@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -67,13 +68,14 @@ class _Log:
                     joints[heading] = series
         if not joints:
             raise RecordingError(self._name, "has no samples of joints")
-        first = self._skip
+        first, last = self._skip, max(range(self._skip, len(times)), key=times.__getitem__)
+        later = (index for index in range(first, len(times)) if times[index] > times[first])
         return JointLog(
             joints=joints,
             frames={},
             begin=min(times[first:]),
-            end=max(times[first:]),
-            anchor=tuple(range(first, min(first + 2, len(times)))),
+            end=times[last],
+            anchor=(first, *itertools.islice(later, 1), last),
             left_out=self._skip,
             cut=self._cut,
             origin=table.origin,

@@ -53,7 +53,7 @@ class JointLog:
         joints: by name.
         frames: by child and parent.
         begin, end: times [ns] of the first and of the last sample of whichever.
-        anchor: rows that tell `begin`, and that a stamp of 0 there is no missing one.
+        anchor: rows that tell `begin`, that a stamp of 0 there is no missing one, and `end`.
         left_out: leading samples that were left out: their stamps are 0, as before a clock is there.
         cut: given rows and a note on where they come from, returns a file that reads as these rows of the log do.
         origin: the note that a log carries which was cut out of another one; else empty.
@@ -122,15 +122,16 @@ def read_messages(name: str, log: MessageLog, choice: Choice) -> JointLog:
         told = f" with frame_id {choice.frame_id!r}" if choice.frame_id is not None else ""
         raise RecordingError(name, f"has no message with positions of joints on topic {_topic(choice)!r}{told}")
     begin, first = min((int(one.time.min()), int(one.row[one.time.argmin()])) for one in tracks.values())
-    channel = rows[first].message.channel
-    later = (index for index in range(first + 1, len(rows)) if rows[index].message.channel == channel)
-
+    end, last = max((int(one.time.max()), int(one.row[one.time.argmax()])) for one in tracks.values())
+    begins = (rows[first].message.channel, rows[first].samples[0].stamp)
+    heads = enumerate((row.message.channel, row.samples[0].stamp) for row in rows)
+    later = (index for index, (channel, stamp) in heads if channel == begins[0] and stamp > begins[1])
     return JointLog(
         joints={key: one for key, one in tracks.items() if isinstance(key, str)},
         frames={key: one for key, one in tracks.items() if isinstance(key, tuple)},
         begin=begin,
-        end=max(int(one.time.max()) for one in tracks.values()),
-        anchor=(first, *itertools.islice(later, 1)),
+        end=end,
+        anchor=(first, *itertools.islice(later, 1), last),
         left_out=left_out,
         cut=lambda chosen, origin: write_messages([rows[index].message for index in chosen], log, origin),
         origin=log.metadata.get(EXCERPT, {}),

@@ -101,7 +101,8 @@ def decoder(name: str, channel: Channel, schema: Schema | None) -> Decoder:
 def _decode_of(name: str, channel: Channel, schema: Schema | None) -> Decoder:
     kind, encoding = kind_of(schema), channel.encoding
     if encoding == "json":
-        return _json
+        whole = {"foxglove.JointStates": "joints", "foxglove.FrameTransforms": "transforms"}.get(kind, "")
+        return lambda data: _json(data, whole)
     if schema is not None and encoding == "protobuf" and kind.startswith("foxglove.") and kind in JOINTS + TRANSFORMS:
         type_ = message_type(name, schema.name, schema.data)
         return lambda data: _protobuf(type_.FromString(data))
@@ -163,8 +164,10 @@ def _transform_stamped(message: Mapping[str, Any]) -> Sample:
     return Sample(_header_stamp(header), header["frame_id"], (message["child_frame_id"],), [pose])
 
 
-def _json(data: bytes) -> list[Sample]:
+def _json(data: bytes, whole: str) -> list[Sample]:
+    """Return the samples of a message; `whole` is the list that its type has, which may be left out when empty."""
     message = _object(json.loads(data), "it")
+    message = {whole: [], **message} if whole else message
     if "transforms" in message:
         return [_json_transform(_object(item, "a transform")) for item in message["transforms"]]
     if "child_frame_id" in message or "childFrameId" in message:

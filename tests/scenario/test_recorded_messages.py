@@ -200,6 +200,36 @@ def test_a_simulated_clock_may_begin_at_zero(tmp_path, kind):
     assert_same_track(again, later)
 
 
+@pytest.mark.parametrize("seed", range(60))
+def test_an_excerpt_of_a_log_in_any_disorder_reads_as_the_log(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    times = int(rng.choice([0, 10**9, 10**18])) + np.cumsum(rng.integers(5_000_000, 40_000_000, rng.integers(2, 400)))
+    times -= times[0] * (rng.random() < 0.3)
+    said = [Said(int(t), int(t) + 7, {"swing": float(np.sin(k * 0.02)), "x": 1.0}) for k, t in enumerate(times)]
+    if rng.random() < 0.3:  # no stamps at all
+        said = [replace(s, stamp=0) for s in said]
+    if rng.random() < 0.3:  # and before the clock
+        said = [replace(s, stamp=0, time=s.time - 6) for s in said[: rng.integers(1, 4)]] + said
+    if rng.random() < 0.5:
+        said = [s for s in said for _ in range(rng.integers(1, 3))]
+    if rng.random() < 0.5:
+        said = [said[k] for k in rng.permutation(len(said))]
+    if rng.random() < 0.5:
+        said = [replace(s, joints={k: v for k, v in s.joints.items() if rng.random() < 0.7}) for s in said]
+    more = f"start: {rng.choice([0, 0.5, 2.0]) * rng.random():.6f}"
+    try:
+        whole = load(tmp_path, made_logs.mcap(said, str(rng.choice([*made_logs.MESSAGES]))), more)
+    except ScenarioError as error:
+        assert any(
+            rule in str(error)
+            for rule in ("do not increase", "stamped 0", "last sample", "not in the log", "no joint of", "gap")
+        )
+        return
+    again = load_sources(whole.main_source, whole.sources)
+    assert again.sources == whole.sources
+    assert_same_track(again, whole)
+
+
 @pytest.mark.parametrize("first", [12_500_000_000, 1_700_000_000 * 10**9])
 def test_samples_before_the_clock_was_there_are_left_out(tmp_path, first):
     said = [replace(s, stamp=s.stamp - 1_700_000_000 * 10**9 + first) for s in swinging()]
