@@ -72,7 +72,7 @@ def in_window(path: tuple[str | int, ...], series: Series, window: Window) -> Se
     if (steps <= 0).any():
         at = _first(steps <= 0)
         rule = "has times in the log that do not increase"
-        if window.published and not time[:-1][steps <= 0].any():
+        if window.published and steps[at] == 0 and not time[:-1][steps == 0].any():
             raise Unusable(path, "has samples in the log that differ and are all stamped 0, as before a clock is there")
         if steps[at] == 0 and window.published:
             both = " and ".join(_value(value) for value in series.value[at : at + 2])
