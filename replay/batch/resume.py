@@ -24,7 +24,8 @@ def earlier_result(
     """Return the result in a scenario's folder, or why it cannot be used again.
 
     The recording's checksums are verified, and what it says of itself is compared with what a run would say now: the
-    scenario's files and meshes by SHA-256, the model, the package's sources, the libraries.
+    scenario's files and meshes by SHA-256, and those of which it needs an excerpt alone; the model, the package's
+    sources, the libraries.
 
     Args:
         scenario: what is to be run.
@@ -50,6 +51,7 @@ def earlier_result(
     now = {"scenario": scenario.name, "root": scenario.main_source, "code": code_identity()}
     changed = [what for what, value in now.items() if getattr(found, what) != value]
     changed += _changes("file ", found.files, scenario.sha256)
+    changed += _changes("original of ", _digests(found.originals), _digests(scenario.provenance.originals))
     changed += _changes("model ", found.model, (model or scenario.model).identity(savings=savings))
     changed += _changes("version of ", found.libraries, library_versions())
     return f"changed: {', '.join(changed)}" if changed else result
@@ -57,3 +59,7 @@ def earlier_result(
 
 def _changes(what: str, before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     return [f"{what}{name}" for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
+
+
+def _digests(originals: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    return {name: origin.get("sha256", "") for name, origin in originals.items()}

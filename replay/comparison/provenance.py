@@ -25,12 +25,22 @@ def provenance_changes(baseline: Provenance, candidate: Provenance) -> tuple[Cha
 
 
 def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
-    """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same."""
-    return _changes(_bodies(baseline), _bodies(candidate))
+    """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same.
+
+    A log of which a recording keeps an excerpt is the same if the excerpts are, or what they were cut out of.
+    """
+    a, b = _originals(baseline), _originals(candidate)
+    changes = _changes(_bodies(baseline), _bodies(candidate))
+    return tuple(c for c in changes if c.name not in a or a[c.name] != b.get(c.name))
 
 
 def _bodies(provenance: Provenance) -> dict[str, str]:
     return {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if not _is_text(name)}
+
+
+def _originals(provenance: Provenance) -> dict[str, str]:
+    own = {name: origin.get("sha256", "") for name, origin in provenance.originals.items()}
+    return {FILES + name: own.get(name, digest) for name, digest in provenance.files.items()}
 
 
 def _is_text(name: str) -> bool:

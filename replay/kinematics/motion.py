@@ -55,10 +55,32 @@ class Keyframe:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Recorded positions of a joint: times (n,) [s], strictly increasing, and positions (n,) [rad or m]; n >= 1."""
+    """Recorded positions of a joint.
+
+    Attributes:
+        seconds: (n,) times [s], strictly increasing; n >= 1.
+        positions: (n,) [rad or m].
+        tolerance: how far they may be beyond the joint's limits [rad or m]: what was measured has noise.
+    """
 
     seconds: Array
     positions: Array
+    tolerance: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTrack:
+    """Recorded poses of a free joint's link, in the joint's frame.
+
+    Attributes:
+        seconds: (n,) times [s], strictly increasing; n >= 1.
+        xyz: (n, 3) [m].
+        quat_xyzw: (n, 4), not zero.
+    """
+
+    seconds: Array
+    xyz: Array
+    quat_xyzw: Array
 
 
 @dataclass(frozen=True)
@@ -69,6 +91,12 @@ class Script:
     moves: tuple[Move, ...] = ()
     free: Mapping[str, tuple[Keyframe, ...]] = field(default_factory=dict)
     recorded: Mapping[str, Track] = field(default_factory=dict)
+    recorded_free: Mapping[str, FreeTrack] = field(default_factory=dict)
+
+    def tolerance(self, joint: str) -> float:
+        """Return how far a joint may be beyond its position limits [rad or m]."""
+        track = self.recorded.get(joint)
+        return track.tolerance if track is not None else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +124,7 @@ class Motion:
     """
 
     profiles: tuple[Profile, ...]
-    paths: tuple[_FreePath | None, ...]
+    paths: tuple[FreePath | None, ...]
 
     def states(self, seconds: Array) -> JointStates:
         """Return the joint states at times (n,) [s]; those at one time do not depend on the others."""
@@ -129,11 +157,10 @@ def plan(linkage: Linkage, script: Script) -> Motion:
     """
     profiles = joint_profiles(linkage, script)
     for joint in linkage.joints:
-        check_limits(joint, profiles[joint.name])
-    paths = tuple(
-        _FreePath.through(name, script.free[name]) if name in script.free else None for name in linkage.free_names
-    )
-    return Motion(tuple(profiles[joint.name] for joint in linkage.joints), paths)
+        check_limits(joint, profiles[joint.name], script.tolerance(joint.name))
+    paths = {name: FreePath.through(name, keyframes) for name, keyframes in script.free.items()}
+    paths |= {name: FreePath.along(name, track) for name, track in script.recorded_free.items()}
+    return Motion(tuple(profiles[joint.name] for joint in linkage.joints), tuple(map(paths.get, linkage.free_names)))
 
 
 def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
@@ -148,10 +175,12 @@ def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
     for kind, names in (("points", set(script.points)), ("moves", moved), ("recorded", set(script.recorded))):
         for name in sorted(names - joints.keys()):
             raise InvalidValue(f"motion.{kind}", repr(name), f"names no such joint; joints are {sorted(joints)}")
-    for name in sorted(set(script.free) - set(linkage.free_names)):
+    for name in sorted((set(script.free) | set(script.recorded_free)) - set(linkage.free_names)):
         raise InvalidValue(
             "motion.free", repr(name), f"names no free joint; free joints are {list(linkage.free_names)}"
         )
+    for name in sorted(set(script.free) & set(script.recorded_free)):
+        raise InvalidValue("motion.free", repr(name), "is moved by motion.recorded as well; keep one of the two")
     for name in sorted(moved & set(script.points)):
         raise InvalidValue("motion.moves", repr(name), "is moved by motion.points as well; keep one of the two")
     for name in sorted(set(script.recorded) & (moved | set(script.points))):
@@ -162,8 +191,14 @@ def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
     return profiles | _planned(joints, script.moves)
 
 
-def check_limits(joint: Joint, profile: Profile) -> None:
-    """Raise MotionLimitError where the profile leaves the joint's limits, the worst place first."""
+def check_limits(joint: Joint, profile: Profile, tolerance: float = 0.0) -> None:
+    """Raise MotionLimitError where the profile leaves the joint's limits, the worst place first.
+
+    Args:
+        joint: whose limits they are.
+        profile: its motion.
+        tolerance: how far positions may be beyond [rad or m].
+    """
     unit = joint.type.unit
     limits = (
         (0, "position", joint.lower, joint.upper, unit),
@@ -179,9 +214,10 @@ def check_limits(joint: Joint, profile: Profile) -> None:
         size = max(abs(bound) for bound in (lower, upper) if math.isfinite(bound))
         over_time, over = max(candidates, key=lambda item: item[1])
         under_time, under = min(candidates, key=lambda item: item[1])
-        if over > upper + LIMIT_SLACK * size:
+        slack = LIMIT_SLACK * size + (tolerance if derivative == 0 else 0.0)
+        if over > upper + slack:
             raise MotionLimitError(joint.name, over_time, quantity, over, upper, unit)
-        if under < lower - LIMIT_SLACK * size:
+        if under < lower - slack:
             raise MotionLimitError(joint.name, under_time, quantity, under, lower, unit)
 
 
@@ -225,7 +261,7 @@ def _planned(joints: Mapping[str, Joint], moves: tuple[Move, ...]) -> dict[str, 
 
 
 @dataclass(frozen=True, eq=False)
-class _FreePath:
+class FreePath:
     """The way of a free joint: m times [s], positions (m, 3) [m] and unit quaternions (m, 4)."""
 
     times: Array
@@ -233,16 +269,20 @@ class _FreePath:
     quat_xyzw: Array
 
     @staticmethod
-    def through(name: str, keyframes: tuple[Keyframe, ...]) -> _FreePath:
+    def through(name: str, keyframes: tuple[Keyframe, ...]) -> FreePath:
+        """Return the path through key frames; InvalidValue when there are none, or their times do not increase."""
         if not keyframes:
             raise InvalidValue(f"motion.free.{name}", "[]", "must have at least one key frame")
-        times = np.array([key.time for key in keyframes])
-        if np.any(np.diff(times) <= 0.0):
-            raise InvalidValue(f"motion.free.{name}", times.tolist(), "times must strictly increase")
-        quat = np.array([key.quat_xyzw for key in keyframes])
-        return _FreePath(
-            times, np.array([key.xyz for key in keyframes]), quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None]
-        )
+        times, xyz, quat = zip(*((key.time, key.xyz, key.quat_xyzw) for key in keyframes), strict=True)
+        return FreePath.along(name, FreeTrack(np.array(times), np.array(xyz), np.array(quat)))
+
+    @staticmethod
+    def along(name: str, track: FreeTrack) -> FreePath:
+        """Return the path through recorded poses; InvalidValue when their times do not strictly increase."""
+        if np.any(np.diff(track.seconds) <= 0.0):
+            raise InvalidValue(f"motion.free.{name}", track.seconds.tolist(), "times must strictly increase")
+        quat = track.quat_xyzw
+        return FreePath(track.seconds, track.xyz, quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None])
 
     def poses(self, seconds: Array) -> Array:
         """Poses (n, 4, 4) between key frames: position on a straight line, rotation by slerp, the end values hold."""

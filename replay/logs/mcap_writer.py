@@ -106,11 +106,11 @@ class McapFileWriter:
         self._put_record(record)
         return number
 
-    def channel(self, topic: str, schema_id: int) -> int:
-        """Add a channel of protobuf messages and return its id."""
-        number = len(self._channels) + 1
+    def channel(self, topic: str, schema_id: int, *, encoding: str = "protobuf", number: int | None = None) -> int:
+        """Add a channel of messages and return its id: `number`, or the next one."""
+        number = len(self._channels) + 1 if number is None else number
         record = mcap.records.Channel(
-            id=number, topic=topic, message_encoding="protobuf", metadata={}, schema_id=schema_id
+            id=number, topic=topic, message_encoding=encoding, metadata={}, schema_id=schema_id
         )
         self._channels.append(record)
         self._put_record(record)

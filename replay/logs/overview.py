@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from replay.errors import RecordingError
-from replay.logs.joint_messages import Decoder, decoder
+from replay.logs.joint_messages import TRANSFORMS, Decoder, decoder, kind_of
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import Channel
 
@@ -72,8 +72,9 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
             topic = log.channels[run.channel].topic
             try:
                 for message in run.messages():
-                    for joint, position in decoders[run.channel](message)[1]:
-                        ranges.setdefault((topic, joint), _Range()).add(position)
+                    for sample in decoders[run.channel](message):
+                        for joint, position in sample.positions:
+                            ranges.setdefault((topic, joint), _Range()).add(position)
             except RecordingError:  # JSON of another kind, say
                 del decoders[run.channel]
                 ranges = {key: found for key, found in ranges.items() if key[0] != topic}
@@ -90,8 +91,11 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
 
 
 def _decoder(log: McapLog, channel: Channel) -> Decoder | None:
+    schema = log.schemas.get(channel.schema_id)
+    if kind_of(schema) in TRANSFORMS:
+        return None
     try:
-        return decoder(str(log.path), channel, log.schemas.get(channel.schema_id))
+        return decoder(str(log.path), channel, schema)
     except RecordingError:
         return None
 

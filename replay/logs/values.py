@@ -1,4 +1,4 @@
-"""Messages of any log as plain values: protobuf, JSON and ROS 2 (CDR), by the schema that the log carries."""
+"""Messages of any log as plain values: protobuf, JSON and ROS 1 or 2, by the schema that the log carries."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import mcap.records
 from google.protobuf.descriptor import FieldDescriptor
 
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.protobuf import message_type
+from replay.logs.ros_messages import ros_decoder
 
 Values = Mapping[str, Any]
 """Numbers, texts, bytes, and lists and mappings of them, by field."""
@@ -22,7 +22,7 @@ def value_decoder(file: str, channel: Channel, schema: Schema | None) -> Callabl
     What is returned raises whatever its format's library does on bytes that are not its messages.
 
     Raises:
-        RecordingError: a protobuf schema cannot be used.
+        RecordingError: a schema cannot be used.
     """
     if channel.encoding == "json":
         return _json
@@ -31,9 +31,7 @@ def value_decoder(file: str, channel: Channel, schema: Schema | None) -> Callabl
     if channel.encoding == "protobuf" and schema.encoding == "protobuf":
         type_ = message_type(file, schema.name, schema.data)
         return lambda data: _protobuf(type_.FromString(data))
-    if channel.encoding == "cdr" and schema.encoding == "ros2msg":
-        return _ros2(mcap.records.Schema(channel.schema_id, schema.data, schema.encoding, schema.name))
-    return None
+    return ros_decoder(file, channel, schema)
 
 
 def _json(data: bytes) -> Values:
@@ -59,23 +57,3 @@ def _protobuf(message: Any) -> Values:
 
 def _in_map(value: Any) -> Any:
     return _protobuf(value) if hasattr(value, "DESCRIPTOR") else value
-
-
-def _ros2(schema: mcap.records.Schema) -> Callable[[bytes], Values]:
-    from mcap_ros2.decoder import DecoderFactory
-
-    decode: Any = None
-
-    def values(data: bytes) -> Values:
-        nonlocal decode
-        decode = decode or DecoderFactory().decoder_for("cdr", schema)
-        found: Values = _ros2_values(decode(data))
-        return found
-
-    return values
-
-
-def _ros2_values(message: Any) -> Any:
-    if hasattr(message, "__slots__"):
-        return {name: _ros2_values(getattr(message, name)) for name in message.__slots__}
-    return [_ros2_values(item) for item in message] if isinstance(message, list | tuple) else message

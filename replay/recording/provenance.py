@@ -11,7 +11,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata, resources
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -41,12 +41,13 @@ class Provenance:
         frames: frames that the scenario has; a salvaged recording holds fewer.
         layout: the names behind the columns.
         model: the resolved model, with the revision of each method.
-        files: SHA-256 of each input file, by its name among the attachments.
+        files: SHA-256 of each attached file, by its name among the attachments.
         code: SHA-256 of the package's sources.
         version: of the package.
         libraries: versions of the libraries that numbers may depend on.
         block_frames: frames a block.
         format: version of the recording format.
+        originals: name and SHA-256 of the file that an attachment is an excerpt of, by the attachment's name.
     """
 
     scenario: str
@@ -60,10 +61,13 @@ class Provenance:
     libraries: Mapping[str, str]
     block_frames: int = BLOCK_FRAMES
     format: int = FORMAT
+    originals: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def to_metadata(self) -> dict[str, str]:
-        """Return the values of the MCAP metadata record, each as JSON with sorted keys."""
+        """Return the values of the MCAP metadata record, each as JSON with sorted keys; `originals` only if any."""
         values = vars(self) | {"layout": vars(self.layout)}
+        if not self.originals:
+            del values["originals"]
         return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
 
     @staticmethod
@@ -78,13 +82,16 @@ class Provenance:
             if version not in READABLE_FORMATS:
                 readable = " and ".join(map(str, READABLE_FORMATS))
                 raise RecordingError(file, f"has recording format {version}; this version of replay reads {readable}")
-            known = {field.name: json.loads(values[field.name]) for field in dataclasses.fields(Provenance)}
-            names = {field.name: known["layout"][field.name] for field in dataclasses.fields(Layout)}
-            if not all(isinstance(name, str) for group in names.values() for name in group):
+            written = {"originals": "{}", **values}
+            known = {field.name: json.loads(written[field.name]) for field in dataclasses.fields(Provenance)}
+            layout = {field.name: known["layout"][field.name] for field in dataclasses.fields(Layout)}
+            if not all(isinstance(name, str) for group in layout.values() for name in group):
                 raise TypeError("names must be texts")
-            known["layout"] = Layout(**{key: tuple(group) for key, group in names.items()})
+            known["layout"] = Layout(**{key: tuple(group) for key, group in layout.items()})
             if not isinstance(known["frames"], int) or not isinstance(known["block_frames"], int):
                 raise TypeError("frame counts must be integers")
+            if not all(isinstance(text, str) for origin in known["originals"].values() for text in origin.values()):
+                raise TypeError("names and digests of originals must be texts")
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise RecordingError(file, f"damaged: its metadata cannot be used ({error!r})") from None
         return Provenance(**known)
@@ -118,7 +125,14 @@ def library_versions() -> dict[str, str]:
 
 
 def describe(
-    scenario: str, root: str, files: Mapping[str, bytes], *, frames: int, layout: Layout, model: Mapping[str, Any]
+    scenario: str,
+    root: str,
+    files: Mapping[str, bytes],
+    *,
+    frames: int,
+    layout: Layout,
+    model: Mapping[str, Any],
+    originals: Mapping[str, Mapping[str, str]] | None = None,
 ) -> Provenance:
     """Return the provenance of a recording that this package, in this environment, is about to make."""
     return Provenance(
@@ -131,6 +145,7 @@ def describe(
         code=code_identity(),
         version=replay.__version__,
         libraries=library_versions(),
+        originals=originals or {},
     )
 
 

@@ -83,6 +83,7 @@ def record_blocks(
         frames=scene.frames,
         layout=scene.layout,
         model=scene.model.identity(savings=scene.savings),
+        originals=scenario.provenance.originals,
     )
     shown = view(scene)
     shown_in = Path(directory) / f"{scenario.name}.rrd"

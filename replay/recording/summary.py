@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from replay.errors import ForeignLogError, count
-from replay.logs.joint_log import DEFAULT_TOPIC
+from replay.logs.joint_log import JOINT_TOPIC
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
 from replay.logs.overview import JointRange, TopicSummary, overview
@@ -106,7 +106,7 @@ class Summary:
     def _joints(self) -> Iterator[str]:
         width = max((len(found.joint) for found in self.joints), default=0)
         for topic in dict.fromkeys(found.topic for found in self.joints):
-            source = self.path.name if topic == DEFAULT_TOPIC else f"{self.path.name}, topic: {topic}"
+            source = self.path.name if topic == JOINT_TOPIC else f"{self.path.name}, topic: {topic}"
             yield f"joints of {topic}, for motion: {{recorded: {{file: {source}}}}}"
             for found in self.joints:
                 if found.topic == topic:

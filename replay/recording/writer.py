@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from replay.errors import InvalidValue
+from replay.logs.mcap_records import MAGIC
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import PartFile
 from replay.recording import messages
@@ -75,8 +76,8 @@ class McapWriter:
         self._log = McapFileWriter(self._file, f"replay {self._provenance.version}")
         self._log.metadata(RECORD, self._provenance.to_metadata())
         for name, data in sorted(self._files.items()):
-            media_type = _MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
-            self._log.attachment(name, media_type, data)
+            ending = ".mcap" if data.startswith(MAGIC) else PurePosixPath(name).suffix.lower()
+            self._log.attachment(name, _MEDIA_TYPES.get(ending, "application/octet-stream"), data)
         self._scene_data = scene_message(self._scene)
         layout = self._provenance.layout
         groups = {

@@ -217,18 +217,22 @@ def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenanc
 
 def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> list[Problem]:
     """Read the log of recorded motion, which is looked for like a mesh, and what it says of the joints."""
-    from replay.scenario.recorded import PATH, tracks
+    from replay.scenario.recorded import PATH, read
 
     node, provenance = find(root, (*PATH, "file")), scenario.provenance
     assert node is not None
     try:
         name = resolve_name(str(node.value), text.names[node.place.file])
-        provenance.sources[name] = library.read(name)
     except SourceRule as error:
         return [problem_at(root, (*PATH, "file"), str(error))]
-    found, problems = tracks(scenario, library.shown(name), provenance.sources[name])
-    provenance.tracks.update(found)
-    return problems
+    found = read(scenario, library, name)
+    provenance.tracks.update(found.tracks)
+    provenance.free_tracks.update(found.free)
+    provenance.log_notes.extend(found.notes)
+    if not found.problems:
+        provenance.sources[name] = found.excerpt
+        provenance.originals[name] = dict(found.origin)
+    return found.problems
 
 
 def _sections_known(root: Node) -> bool:

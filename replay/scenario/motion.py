@@ -8,7 +8,15 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from replay.scenario.fields import Flag, Name, Part, Placement, Vector, rejected
-from replay.scenario.units import JointAcceleration, JointPosition, JointVelocity, Share, Time
+from replay.scenario.units import (
+    Dimensioned,
+    JointAcceleration,
+    JointPosition,
+    JointVelocity,
+    LimitTolerance,
+    Share,
+    Time,
+)
 
 SHORTEST = 1e-9
 """Shortest time between two points [s]: the resolution of recordings, and it keeps polynomials finite."""
@@ -72,29 +80,55 @@ class RecordedJoint(Part):
     name: Annotated[str, Field(min_length=1)]
     """What the log calls it."""
     unit: Literal["rad", "deg", "mrad", "m", "cm", "mm", "um", "km", "in"] | None = None
-    """Unit of the positions in the log; rad or m when left out."""
+    """Unit of the positions in the log; when left out, the one in brackets in a CSV heading, or rad or m."""
+
+
+class RecordedFrame(Part):
+    """The frame of a log that moves a free link."""
+
+    child: Annotated[str, Field(min_length=1)] | None = None
+    """What the log calls it; the link's name when left out."""
+    parent: Annotated[str, Field(min_length=1)] | None = None
+    """The frame of the log that stands for the frame of the link's joint; may be left out if the log has one only."""
 
 
 class TimeColumn(Part):
     """The times of a CSV file."""
 
-    column: Annotated[str, Field(min_length=1)] = "time"
-    """Heading of the column."""
-    unit: Literal["s", "ms", "us", "min"] = "s"
-    """Its unit."""
+    column: Annotated[str, Field(min_length=1)] | None = None
+    """Heading of the column; `time`, or `time [UNIT]`, when left out."""
+    unit: Literal["s", "ms", "us", "ns", "min"] | None = None
+    """Its unit; when left out, the one in brackets in its heading, or s. Dates as of ISO 8601 have none."""
 
 
 class Recorded(Part):
-    """Joint positions from a log; between samples they are interpolated linearly, outside the ends hold."""
+    """Joint positions from a log; between samples they are interpolated linearly, outside the ends hold.
+
+    A continuous joint goes the short way round between two samples. What the log holds beyond the scenario's time does
+    not matter.
+    """
 
     file: Annotated[str, Field(min_length=1)]
-    """A .mcap (of replay, Foxglove or ROS 2) or .csv file inside the scenario's folder tree."""
+    """A .mcap (of replay, Foxglove or ROS), .csv, ROS 1 .bag or ROS 2 .db3 file, or a ROS 2 bag's folder, inside the
+    scenario's folder tree."""
     topic: str | None = None
-    """Topic of the joint states in a .mcap file; /joint_states when left out."""
+    """Topic of the joint states in a log of messages; /joint_states when left out, and /tf for transforms."""
+    channel: Annotated[int, Field(strict=True, ge=0)] | None = None
+    """The only channel (of a bag: connection or topic id) that is read of a topic: one of several publishers."""
+    frame_id: str | None = None
+    """The only frame_id that is read of joint states: one of several publishers on one channel."""
     time: TimeColumn | None = None
     """Column with the times of a .csv file; `time` in seconds when left out."""
+    separator: Literal[",", ";", "\t", "|"] | None = None
+    """What separates the cells of a .csv file; found in its headings when left out."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign of a .csv file; found in its numbers when left out."""
     joints: dict[Name, RecordedJoint] = Field(default_factory=dict)
     """The log's joint by joint of the scenario; when left out, the joints that both have under the same name."""
+    free: dict[Name, RecordedFrame] = Field(default_factory=dict)
+    """The log's frame by link with a free joint, from transforms (TF)."""
+    limit_tolerance: LimitTolerance = Dimensioned(1e-4, None)
+    """How far a measured position may be beyond a limit [rad or m], 1e-4 when left out; a note says so."""
     start: Time = 0.0
     """Time [s] after the log's first sample at which the scenario begins."""
     max_gap: Time = 1.0

@@ -28,6 +28,7 @@ def notes(scenario: Scenario) -> list[Problem]:
             found.append(problem(("motion", kind, joint, late[0], "time"), f"is {after}{more}"))
     for index, moved_until in _late_moves(scenario, end):
         found.append(problem(("motion", "moves", index), f"ends at {moved_until:.6g} s, {after}"))
+    found.extend(scenario.provenance.log_notes)
     found.extend(_short_logs(scenario))
     for index, expected in enumerate(scenario.expect):
         window = expected.contact if isinstance(expected, PairExpectation) else None
@@ -54,8 +55,9 @@ def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
 
 def _short_logs(scenario: Scenario) -> Iterator[Problem]:
     last = float(Fraction(scenario.frames - 1) / Fraction(scenario.rate))
-    ends = {joint: track.seconds[-1] for joint, track in sorted(scenario.provenance.tracks.items())}
-    short = [f"{joint} at {seconds:.6g} s" for joint, seconds in ends.items() if seconds < last - 1e-9]
+    ends = {joint: float(track.seconds[-1]) for joint, track in scenario.provenance.tracks.items()}
+    ends |= {joint: float(track.seconds[-1]) for joint, track in scenario.provenance.free_tracks.items()}
+    short = [f"{joint} at {seconds:.6g} s" for joint, seconds in sorted(ends.items()) if seconds < last - 1e-9]
     if short:
         rule = f"ends before the scenario's last frame at {last:.6g} s: {', '.join(short)}; the last positions hold"
         yield scenario.provenance.problem(("motion", "recorded", "file"), rule)

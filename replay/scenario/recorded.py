@@ -1,153 +1,280 @@
-"""Recorded motion: which joint of a log moves which joint of the scenario, checked and converted to SI."""
+"""Recorded motion: which joint or frame of a log moves which joint of the scenario, checked and converted to SI."""
 
 from __future__ import annotations
 
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from replay.errors import Problem, RecordingError
-from replay.kinematics.motion import Track
-from replay.logs.joint_log import DEFAULT_TOPIC, JointTrack, read_csv, read_mcap
+from replay.errors import Problem, RecordingError, count
+from replay.kinematics.motion import FreeTrack, Track
+from replay.logs.csv_table import Format, is_excerpt, unit_of
+from replay.logs.exported import ENDINGS, as_csv
+from replay.logs.joint_csv import read_csv
+from replay.logs.joint_log import Choice, JointLog, read_messages
+from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
 from replay.scenario.names import SCALAR_JOINTS
 from replay.scenario.problems import did_you_mean
+from replay.scenario.recorded_frames import pose_track
+from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window, unwrapped
+from replay.scenario.source import Library, SourceRule
 from replay.scenario.units import ANGLE, LENGTH, TIME
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
-    from replay.scenario.motion import RecordedJoint
+    from replay.scenario.motion import Recorded, RecordedFrame, RecordedJoint
 
 PATH = ("motion", "recorded")
+_TABLES = ("csv", "tsv")
+_OF_TABLES = ("time", "separator", "decimal")
+_OF_MESSAGES = ("topic", "channel", "frame_id", "free")
 
 
-class Unusable(Exception):
-    """A part of the recorded motion cannot be used: the path of the language, and the rule that is broken."""
+@dataclass
+class Found:
+    """What a log says of a scenario's motion.
 
-    def __init__(self, path: tuple[str | int, ...], rule: str) -> None:
-        self.path = path
-        self.rule = rule
-        super().__init__(rule)
+    Attributes:
+        tracks: by joint.
+        free: by free joint.
+        problems: what is wrong; with any, the rest is of no use.
+        notes: what a reader should know.
+        excerpt: a file with what the scenario needs of the log.
+        origin: name and SHA-256 of the file that the log is, or was cut out of.
+    """
+
+    tracks: dict[str, Track] = field(default_factory=dict)
+    free: dict[str, FreeTrack] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[Problem] = field(default_factory=list)
+    excerpt: bytes = b""
+    origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def tracks(scenario: Scenario, file: str, data: bytes) -> tuple[dict[str, Track], list[Problem]]:
-    """Return the track of each joint that a log moves, and what is wrong.
+def read(scenario: Scenario, library: Library, name: str) -> Found:
+    """Return what the log of a scenario says.
 
     Args:
         scenario: with `motion.recorded`.
-        file: name of the log, for messages.
-        data: its bytes.
+        library: where its files are.
+        name: of the log in the library: a file, or a ROS 2 bag's folder.
     """
-    written = scenario.motion.recorded
-    assert written is not None
-    found: dict[str, Track] = {}
-    problems: list[Problem] = []
-    try:
-        log = _read(scenario, file, data)
-        joints = dict(written.joints) or _same_names(scenario, log)
-        begin = _begin(written.start, log)
-    except Unusable as error:
-        return found, [scenario.provenance.problem(error.path, error.rule)]
-    for joint, source in joints.items():
+    return _Reader(scenario, library, name).found()
+
+
+class _Reader:
+    """Reads one scenario's log."""
+
+    def __init__(self, scenario: Scenario, library: Library, name: str) -> None:
+        assert scenario.motion.recorded is not None
+        self._scenario = scenario
+        self._written: Recorded = scenario.motion.recorded
+        self._library = library
+        self._name = name
+        self._found = Found()
+        self._rows: set[int] = set()
+
+    def found(self) -> Found:
+        """Return what it says."""
+        found = self._found
         try:
-            found[joint] = _track(scenario, joint, source, log, begin)
+            log, digest = self._read()
+            joints, window = self._joints(log), self._window(log)
         except Unusable as error:
-            problems.append(scenario.provenance.problem(error.path, error.rule))
-    return found, problems
+            self._wrong(error)
+            return found
+        for joint, source in joints.items():
+            try:
+                found.tracks[joint] = self._track(joint, source, log, window)
+            except Unusable as error:
+                self._wrong(error)
+        for link, frame in self._written.free.items():
+            try:
+                joint, track = self._free_track(link, frame, log, window)
+                found.free[joint] = track
+            except Unusable as error:
+                self._wrong(error)
+        if log.left_out:
+            rule = f"begins with {count(log.left_out, 'sample')} stamped 0, before its clock was there; left out"
+            self._note((*PATH, "file"), rule)
+        if not found.problems:
+            found.origin = dict(log.origin) or {"name": self._name, "sha256": digest}
+            found.excerpt = log.cut(sorted({*log.anchor, *self._rows}), found.origin)
+        return found
+
+    def _read(self) -> tuple[JointLog, str]:
+        """Return the log and the SHA-256 of its file, or of the list of files of its folder."""
+        written, shown = self._written, self._library.shown(self._name)
+        try:
+            data = self._library.read(self._name)
+        except SourceRule as error:
+            return self._read_folder(shown, error)
+        digest = hashlib.sha256(data).hexdigest()
+        kind = self._name.rpartition(".")[2].lower()
+        messages = is_message_log(data) or kind in ("mcap", "bag", "db3")
+        if not messages and kind not in (*_TABLES, *ENDINGS):
+            raise Unusable(
+                (*PATH, "file"), "is neither a .mcap nor a .csv file, nor a ROS bag (.bag, .db3, its folder)"
+            )
+        for option in _OF_TABLES if messages else _OF_MESSAGES:
+            if getattr(written, option) not in (None, {}):
+                more = ", whose messages carry their times" if option == "time" else ""
+                raise Unusable((*PATH, option), f"has no effect with a .{kind} file{more}")
+        try:
+            if messages:
+                return self._of_messages(shown, open_message_log(shown, data)), digest
+            if kind in ENDINGS and not is_excerpt(data):
+                data = as_csv(shown, data)
+            units = {unit: factor * 10**9 for unit, factor in TIME.units.items()}
+            time = (written.time.column, written.time.unit) if written.time else (None, None)
+            format = Format(*time, units, written.separator, written.decimal)
+            needed = {joint.name for joint in written.joints.values()} or set(self._scalar_joints())
+            return read_csv(shown, data, format, needed, self._max_gap), digest
+        except RecordingError as error:
+            raise Unusable((*PATH, "file"), error.reason) from None
+
+    def _read_folder(self, shown: str, error: SourceRule) -> tuple[JointLog, str]:
+        def read(file: str) -> bytes:
+            try:
+                return self._library.read(f"{self._name}/{file}")
+            except SourceRule as wrong:
+                raise RecordingError(shown, f"names the file {file!r}, which {wrong}") from None
+
+        try:
+            self._library.read(f"{self._name}/metadata.yaml")
+        except SourceRule:
+            raise Unusable((*PATH, "file"), str(error)) from None
+        for option in _OF_TABLES:
+            if getattr(self._written, option) is not None:
+                raise Unusable((*PATH, option), "has no effect with a bag, whose messages carry their times")
+        try:
+            log, files = open_bag_folder(shown, read)
+            listed = "".join(f"{hashlib.sha256(data).hexdigest()}  {file}\n" for file, data in sorted(files.items()))
+            return self._of_messages(shown, log), hashlib.sha256(listed.encode()).hexdigest()
+        except RecordingError as wrong:
+            raise Unusable((*PATH, "file"), wrong.reason) from None
+
+    def _of_messages(self, shown: str, log: MessageLog) -> JointLog:
+        written = self._written
+        joints = True if written.joints or not written.free else None
+        choice = Choice(joints, bool(written.free), written.topic, written.channel, written.frame_id, self._max_gap)
+        return read_messages(shown, log, choice)
+
+    @property
+    def _max_gap(self) -> int:
+        return _nanoseconds(self._written.max_gap)
+
+    def _window(self, log: JointLog) -> Window:
+        begin = log.begin + _nanoseconds(self._written.start)
+        if begin > log.end:
+            rule = f"is after the log's last sample, {(log.end - log.begin) / 1e9:.6g} s after its first"
+            raise Unusable((*PATH, "start"), rule)
+        end = begin + math.ceil(Fraction(self._scenario.duration) * 10**9)
+        return Window(log.begin, begin, end, self._max_gap, log.published)
+
+    def _joints(self, log: JointLog) -> dict[str, RecordedJoint]:
+        """Return the log's joint by joint of the scenario: as written, or those of the same name."""
+        from replay.scenario.motion import RecordedJoint
+
+        if self._written.joints:
+            return dict(self._written.joints)
+        exported = {unit_of(name)[0]: name for name in log.joints}
+        common = {}
+        for mine in self._scalar_joints():
+            theirs = mine if mine in log.joints else exported.get(f"{mine} position", exported.get(mine, ""))
+            if theirs and not self._scripted(mine):
+                common[mine] = RecordedJoint(name=theirs)
+        if not common and not self._written.free:
+            rule = f"has no joint of the scenario's names; it has {sorted(log.joints)}"
+            raise Unusable((*PATH, "file"), f"{rule}: name them in motion.recorded.joints")
+        return common
+
+    def _scalar_joints(self) -> dict[str, str]:
+        """Return the types of the joints that have a position, by name."""
+        joints = ((link.joint.name or name, link.joint.type) for name, link in self._scenario.links.items())
+        return {name: kind for name, kind in joints if kind in SCALAR_JOINTS}
+
+    def _scripted(self, joint: str) -> str:
+        motion = self._scenario.motion
+        if joint in motion.points:
+            return "motion.points"
+        return "motion.moves" if any(joint in move.to for move in motion.moves) else ""
+
+    def _track(self, joint: str, source: RecordedJoint, log: JointLog, window: Window) -> Track:
+        path = (*PATH, "joints", joint)
+        mine = self._scalar_joints()
+        if joint not in mine:
+            raise Unusable(path, f"is no joint with a position; {did_you_mean(joint, mine, what='joints are')}")
+        if other := self._scripted(joint):
+            raise Unusable(path, f"is a joint that {other} moves as well; keep one of the two")
+        if source.name not in log.joints:
+            rule = did_you_mean(source.name, log.joints, what="its joints are")
+            raise Unusable((*path, "name"), f"is not in the log; {rule}")
+        dimension = LENGTH if mine[joint] == "prismatic" else ANGLE
+        if source.unit is not None and source.unit not in dimension.units:
+            rule = f"is no unit of joint {joint!r}, which is {mine[joint]}; units are {', '.join(dimension.units)}"
+            raise Unusable((*path, "unit"), rule)
+        headed = unit_of(source.name)[1]
+        factor = dimension.units[source.unit or (headed if headed in dimension.units else dimension.si)]
+        series = in_window(path, log.joints[source.name], window)
+        self._rows.update(series.row.tolist())
+        value = series.value
+        if mine[joint] == "continuous":
+            value = unwrapped(value, float(ANGLE.units["deg"] * 360 / factor))
+        position = value if factor == 1 else value * float(factor)
+        if window.published:
+            check_turns(path, series.time, position)
+        seconds = window.seconds(series.time)
+        if mine[joint] == "revolute":
+            self._note_jumps(path, seconds, position)
+        return Track(seconds, position, self._tolerance(path, joint, mine[joint], position))
+
+    def _note_jumps(self, path: tuple[str | int, ...], seconds: np.ndarray, position: np.ndarray) -> None:
+        jumps = np.flatnonzero(np.abs(np.diff(position)) > math.pi)
+        if len(jumps):
+            step = float(position[jumps[0] + 1] - position[jumps[0]])
+            more = f", and {len(jumps) - 1} more" if len(jumps) > 1 else ""
+            rule = f"jumps by {step:.4g} rad between two samples at {seconds[jumps[0]]:.6g} s{more}"
+            self._note(path, f"{rule}; if its encoder wraps there, the joint is of type continuous")
+
+    def _tolerance(self, path: tuple[str | int, ...], joint: str, kind: str, position: np.ndarray) -> float:
+        """Return how far a joint may be beyond its limits [rad or m], and note where it is."""
+        dimension = LENGTH if kind == "prismatic" else ANGLE
+        written = self._written.limit_tolerance
+        value = written.value if written.dimension in (None, dimension) else 1e-4
+        limits = next(link.joint for name, link in self._scenario.links.items() if (link.joint.name or name) == joint)
+        over = float(position.max()) - getattr(limits, "upper", math.inf)
+        under = getattr(limits, "lower", -math.inf) - float(position.min())
+        if 0.0 < max(over, under) <= value:
+            rule = f"is beyond a limit by up to {max(over, under):.3g} {dimension.si}, within limit_tolerance"
+            self._note(path, f"{rule} = {value:.3g} {dimension.si}")
+        return value
+
+    def _free_track(self, link: str, frame: RecordedFrame, log: JointLog, window: Window) -> tuple[str, FreeTrack]:
+        path = (*PATH, "free", link)
+        joints = {name: part.joint for name, part in self._scenario.links.items() if part.joint.type == "free"}
+        if link not in joints:
+            raise Unusable(path, f"is no link with a free joint; {did_you_mean(link, joints, what='such links are')}")
+        joint = joints[link].name or link
+        if joint in self._scenario.motion.free:
+            raise Unusable(path, "is a link that motion.free moves as well; keep one of the two")
+        child, parent = ((name or "").removeprefix("/") for name in (frame.child or link, frame.parent))
+        track, rows = pose_track(path, log.frames, child, parent, window)
+        self._rows.update(rows)
+        return joint, track
+
+    def _wrong(self, error: Unusable) -> None:
+        self._found.problems.append(self._scenario.provenance.problem(error.path, error.rule))
+
+    def _note(self, path: tuple[str | int, ...], rule: str) -> None:
+        self._found.notes.append(self._scenario.provenance.problem(path, rule))
 
 
-def _read(scenario: Scenario, file: str, data: bytes) -> dict[str, JointTrack]:
-    written = scenario.motion.recorded
-    assert written is not None
-    kind = file.rpartition(".")[2].lower()
-    if kind not in ("mcap", "csv"):
-        raise Unusable((*PATH, "file"), "is neither a .mcap nor a .csv file")
-    if kind == "mcap" and written.time is not None:
-        raise Unusable((*PATH, "time"), "has no effect with a .mcap file, whose messages carry their times")
-    if kind == "csv" and written.topic is not None:
-        raise Unusable((*PATH, "topic"), "has no effect with a .csv file")
-    try:
-        if kind == "mcap":
-            return read_mcap(file, data, topic=written.topic or DEFAULT_TOPIC)
-        column, unit = (written.time.column, written.time.unit) if written.time else ("time", "s")
-        needed = {joint.name for joint in written.joints.values()} or set(_scalar_joints(scenario))
-        return read_csv(file, data, time_column=column, nanoseconds=float(TIME.units[unit] * 10**9), needed=needed)
-    except RecordingError as error:
-        raise Unusable((*PATH, "file"), error.reason) from None
-
-
-def _begin(start: float, log: dict[str, JointTrack]) -> int:
-    """Return the time [ns] of the log's first sample, of whichever joint."""
-    if not log:
-        raise Unusable((*PATH, "file"), "has no samples of joints")
-    begin = min(int(track.time.min()) for track in log.values())
-    end = max(int(track.time.max()) for track in log.values())
-    if begin + start * 1e9 > end:
-        raise Unusable((*PATH, "start"), f"is after the log's last sample, {(end - begin) / 1e9:.6g} s after its first")
-    return begin
-
-
-def _same_names(scenario: Scenario, log: dict[str, JointTrack]) -> dict[str, RecordedJoint]:
-    """Return the scenario's scalar joints that the log has under the same name."""
-    from replay.scenario.motion import RecordedJoint
-
-    mine = _scalar_joints(scenario)
-    common = {name: RecordedJoint(name=name) for name in mine if name in log and not _scripted(scenario, name)}
-    if not common:
-        rule = f"has no joint of the scenario's names; it has {sorted(log)}: name them in motion.recorded.joints"
-        raise Unusable((*PATH, "file"), rule)
-    return common
-
-
-def _scalar_joints(scenario: Scenario) -> dict[str, str]:
-    """Return the types of the joints that have a position, by name."""
-    joints = ((link.joint.name or name, link.joint.type) for name, link in scenario.links.items())
-    return {name: kind for name, kind in joints if kind in SCALAR_JOINTS}
-
-
-def _scripted(scenario: Scenario, joint: str) -> str:
-    if joint in scenario.motion.points:
-        return "motion.points"
-    return "motion.moves" if any(joint in move.to for move in scenario.motion.moves) else ""
-
-
-def _track(scenario: Scenario, joint: str, source: RecordedJoint, log: dict[str, JointTrack], begin: int) -> Track:
-    written = scenario.motion.recorded
-    assert written is not None
-    path = (*PATH, "joints", joint)
-    mine = _scalar_joints(scenario)
-    if joint not in mine:
-        raise Unusable(path, f"is no joint with a position; {did_you_mean(joint, mine, what='joints are')}")
-    if other := _scripted(scenario, joint):
-        raise Unusable(path, f"is a joint that {other} moves as well; keep one of the two")
-    if source.name not in log:
-        rule = did_you_mean(source.name, log, what="its joints are")
-        raise Unusable((*path, "name"), f"is not in the log; {rule}")
-    dimension = LENGTH if mine[joint] == "prismatic" else ANGLE
-    if source.unit is not None and source.unit not in dimension.units:
-        rule = f"is no unit of joint {joint!r}, which is {mine[joint]}; units are {', '.join(dimension.units)}"
-        raise Unusable((*path, "unit"), rule)
-    if log[source.name].by_turns:
-        rule = "is moved by several publishers on one topic of the log, sample by sample in turn; keep one in the log"
-        raise Unusable(path, rule)
-    factor = 1.0 if source.unit is None else float(dimension.units[source.unit])
-    time, position = log[source.name].time, log[source.name].position * factor
-    if not np.isfinite(position).all():
-        raise Unusable(
-            path, f"has a position in the log that is no finite number: sample {_first(~np.isfinite(position))}"
-        )
-    seconds = (time - begin) / 1e9
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        at = _first(steps <= 0)
-        raise Unusable(
-            path, f"has times in the log that do not increase: after {seconds[at]:.9g} s comes {seconds[at + 1]:.9g} s"
-        )
-    if (steps * 1e-9 > written.max_gap).any():
-        at = _first(steps * 1e-9 > written.max_gap)
-        rule = f"has a gap of {steps[at] * 1e-9:.6g} s in the log at {seconds[at]:.6g} s; raise max_gap to bridge it"
-        raise Unusable(path, f"{rule} in a straight line")
-    return Track(seconds - written.start, position)
-
-
-def _first(mask: np.ndarray) -> int:
-    return int(np.flatnonzero(mask)[0])
+def _nanoseconds(seconds: float) -> int:
+    """Return a time that was written in decimal, exactly."""
+    return round(Fraction(repr(seconds)) * 10**9)

@@ -54,6 +54,7 @@ def script(scenario: Scenario) -> Script:
         ),
         free={name: tuple(_keyframe(key) for key in keyframes) for name, keyframes in motion.free.items()},
         recorded=scenario.provenance.tracks,
+        recorded_free=scenario.provenance.free_tracks,
     )
 
 
@@ -68,7 +69,7 @@ def motion_problems(scenario: Scenario) -> Iterator[Problem]:
         return
     for joint in machine.joints:
         try:
-            check_limits(joint, profiles[joint.name])
+            check_limits(joint, profiles[joint.name], motion.tolerance(joint.name))
         except MotionLimitError as error:
             yield scenario.provenance.problem(_where(scenario, joint.name, error.time), f"breaks a limit: {error}")
 

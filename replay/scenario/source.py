@@ -20,7 +20,7 @@ from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.scenario.node import Node, Place
 
 if TYPE_CHECKING:
-    from replay.kinematics.motion import Track
+    from replay.kinematics.motion import FreeTrack, Track
 
 PACKAGE: Final = "package://"
 MAX_FILE_BYTES: Final = 1 << 30
@@ -53,7 +53,10 @@ class Provenance:
         main: name of the scenario file itself.
         sources: every file the scenario needs, by name.
         meshes: name of the mesh file of each mesh shape, by (link, shape).
-        tracks: recorded motion by joint, read from a log among the sources.
+        tracks: recorded motion by joint, read from a log, of which an excerpt is among the sources.
+        free_tracks: recorded poses by free joint.
+        originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name.
+        log_notes: what a reader should know of the log although it is read.
         root: the text's tree, includes merged.
     """
 
@@ -61,6 +64,9 @@ class Provenance:
     sources: dict[str, bytes] = field(default_factory=dict)
     meshes: dict[tuple[str, str], str] = field(default_factory=dict)
     tracks: dict[str, Track] = field(default_factory=dict, compare=False)
+    free_tracks: dict[str, FreeTrack] = field(default_factory=dict, compare=False)
+    originals: dict[str, dict[str, str]] = field(default_factory=dict)
+    log_notes: list[Problem] = field(default_factory=list, compare=False)
     root: Node | None = field(default=None, compare=False)
 
     @cached_property

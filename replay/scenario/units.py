@@ -61,7 +61,7 @@ LENGTH: Final = Dimension(
     "a length", "m", _metric("m", cm=-2, mm=-3, um=-6, km=3) | {"in": Fraction(254, 10**4)}, "5 cm"
 )
 ANGLE: Final = Dimension("an angle", "rad", _ANGLES | {"mrad": Fraction(1, 1000)}, "30 deg")
-TIME: Final = Dimension("a time", "s", _metric("s", ms=-3, us=-6) | {"min": Fraction(60)}, "5 s")
+TIME: Final = Dimension("a time", "s", _metric("s", ms=-3, us=-6, ns=-9) | {"min": Fraction(60)}, "5 s")
 FREQUENCY: Final = Dimension("a frequency", "Hz", _metric("Hz", kHz=3), "60 Hz")
 VELOCITY: Final = Dimension("a velocity", "m/s", _per(_METRES, "s"), "5 cm/s")
 ANGULAR_VELOCITY: Final = Dimension("an angular velocity", "rad/s", _per(_ANGLES, "s"), "25 deg/s")
@@ -222,6 +222,7 @@ class AnyQuantity:
 
     name: str
     dimensions: tuple[Dimension, ...]
+    at_least: float | None = None
 
     def parse(self, value: object) -> Dimensioned:
         """Return the value in SI with its dimension; raises PydanticCustomError as `Quantity.parse` does."""
@@ -231,6 +232,8 @@ class AnyQuantity:
             raise _rejected("is not finite")
         if abs(number) > _FAR:
             raise _rejected(f"must be between -{_FAR:g} and {_FAR:g}")
+        if self.at_least is not None and number < self.at_least:
+            raise _rejected(f"must be >= {self.at_least:.10g}")
         return Dimensioned(number, dimension)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -239,7 +242,8 @@ class AnyQuantity:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Show a number or a text with one of the units."""
-        return json_schema(self.name, {"type": "number"}, self.dimensions)
+        limit = {} if self.at_least is None else {"minimum": self.at_least}
+        return json_schema(self.name, {"type": "number"} | limit, self.dimensions)
 
 
 QUANTITY_KEY: Final = "x-quantity"
@@ -288,5 +292,6 @@ Share = Annotated[float, Quantity("Share", NUMBER, at_least=1e-3, at_most=1.0)]
 Scale = Annotated[float, Quantity("Scale", NUMBER, at_least=1e-9, at_most=1e9)]
 
 JointPosition = Annotated[Dimensioned, AnyQuantity("JointPosition", (ANGLE, LENGTH))]
+LimitTolerance = Annotated[Dimensioned, AnyQuantity("LimitTolerance", (ANGLE, LENGTH), at_least=0.0)]
 JointVelocity = Annotated[Dimensioned, AnyQuantity("JointVelocity", (ANGULAR_VELOCITY, VELOCITY))]
 JointAcceleration = Annotated[Dimensioned, AnyQuantity("JointAcceleration", (ANGULAR_ACCELERATION, ACCELERATION))]

@@ -13,10 +13,23 @@ from replay.scenario.units import DIMENSIONS, JointPosition, Length, Quantity, R
 
 DECIMALS = st.decimals(allow_nan=False, allow_infinity=False, places=6, min_value=-(10**9), max_value=10**9)
 # an independent table: powers of ten as text, and pi from mpmath
-POWERS = {"m": 0, "cm": -2, "mm": -3, "um": -6, "km": 3, "s": 0, "ms": -3, "us": -6, "Hz": 0, "kHz": 3, "rad": 0}
+POWERS = {
+    "m": 0,
+    "cm": -2,
+    "mm": -3,
+    "um": -6,
+    "km": 3,
+    "s": 0,
+    "ms": -3,
+    "us": -6,
+    "ns": -9,
+    "Hz": 0,
+    "kHz": 3,
+    "rad": 0,
+}
 POWERS |= {"mrad": -3, "m/s": 0, "cm/s": -2, "mm/s": -3, "rad/s": 0, "m/s^2": 0, "cm/s^2": -2, "mm/s^2": -3}
 POWERS |= {"rad/s^2": 0, "F": 0, "uF": -6, "nF": -9, "pF": -12, "fF": -15, "F/m": 0, "nF/m": -9, "pF/m": -12}
-POWERS |= {"V": 0, "mV": -3, "kV": 3}
+POWERS |= {"ns": -9, "V": 0, "mV": -3, "kV": 3}
 DEGREES = ("deg", "deg/s", "deg/s^2")
 SPECIAL = {"in": "0.0254", "min": "60"}
 

@@ -1,0 +1,175 @@
+"""CSV as people have it, as headings and cells: any separator, comments, empty columns, an excerpt's note."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from replay.errors import RecordingError
+from replay.logs.excerpt import EXCERPT
+
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_COMMENT = ("#", "%")
+_IN_BRACKETS = re.compile(r"(.*\S)\s*\[([^\]]+)\]")
+
+
+def unit_of(heading: str) -> tuple[str, str]:
+    """Return a heading without the unit in brackets that it ends in, and that unit; "" for none."""
+    found = _IN_BRACKETS.fullmatch(heading)
+    return (found[1], found[2]) if found else (heading, "")
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a CSV log is written; None for what is to be found out.
+
+    Attributes:
+        time: heading of the column with the times; None: `time`, or `time [UNIT]`.
+        unit: that it counts in, a key of `units`; None: the one in its heading, or s.
+        units: nanoseconds by unit.
+        separator: between cells.
+        decimal: "." or ",".
+    """
+
+    time: str | None
+    unit: str | None
+    units: Mapping[str, Fraction]
+    separator: str | None = None
+    decimal: str | None = None
+
+
+class Table:
+    """The cells of a file.
+
+    Attributes:
+        separator: between its cells.
+        headings: by column; "" for none.
+        time: heading of the times.
+        lines: number of the line of each row.
+        rows: cells, as many as headings.
+        origin: the note on the file that this is a part of, else empty.
+    """
+
+    def __init__(self, name: str, data: bytes, format: Format) -> None:
+        """Read a file; RecordingError as of `read_csv`."""
+        text = _text(name, data)
+        self._name = name
+        self._format = format
+        lines = io.StringIO(text, newline="").readlines()
+        self.origin = _origin(lines[0]) if lines else {}
+        stated = re.fullmatch(r"sep=(.)\s*", lines[0], re.IGNORECASE) if lines else None
+        first = next((i for i, line in enumerate(lines) if i >= bool(stated) and _holds_data(line)), None)
+        if first is None:
+            raise RecordingError(name, "has no headings in its first line, such as time,joint")
+        candidates = (
+            [format.separator or (stated[1] if stated else "")] if format.separator or stated else [*SEPARATORS]
+        )
+        before = next((line for line in reversed(lines[:first]) if line.lstrip().startswith(_COMMENT)), "")
+        chosen = self._headings(lines[first], candidates)
+        self.begin = first + 1
+        if chosen is None and before:
+            chosen = self._headings(before.lstrip().lstrip("".join(_COMMENT)), candidates)
+            self.begin = first
+        if chosen is None:
+            raise RecordingError(name, self._without_time(lines[first], candidates))
+        self.separator, self.headings, self.time = chosen
+        named = [heading for heading in self.headings if heading]
+        if len(set(named)) != len(named):
+            raise RecordingError(name, f"has a heading twice; its columns are {named}")
+        self.lines: list[int] = []
+        self.rows: list[list[str]] = []
+        for line, cells in self._cells(lines):
+            self.lines.append(line)
+            self.rows.append(self._fitted(line, cells))
+
+    def _headings(self, line: str, candidates: Sequence[str]) -> tuple[str, list[str], str] | None:
+        """Return separator, headings and the heading of the times, where there is such a one."""
+        for separator in candidates:
+            headings = [heading.strip() for heading in next(csv.reader([line], delimiter=separator), [])]
+            time = self._time_among(headings)
+            if time is not None:
+                return separator, headings, time
+        return None
+
+    def _time_among(self, headings: Sequence[str]) -> str | None:
+        wanted = self._format.time or "time"
+        if wanted in headings:
+            return wanted
+        units = [h for h in headings if unit_of(h)[0] == "time" and unit_of(h)[1] in self._format.units]
+        return units[0] if self._format.time is None and len(units) == 1 else None
+
+    def _without_time(self, line: str, candidates: Sequence[str]) -> str:
+        by_separator = {s: next(csv.reader([line], delimiter=s), []) for s in candidates}
+        separator = max(candidates, key=lambda s: len(by_separator[s]))
+        headings = [heading.strip() for heading in by_separator[separator]]
+        rule = f"has no column {self._format.time or 'time'!r}; its columns are {headings}"
+        other = [s for s in SEPARATORS if s in line and s not in candidates]
+        if len(headings) == 1 and other:
+            return f"{rule}; its cells seem to be separated by {SEPARATORS[other[0]]}: state separator"
+        if len(headings) == 1 and len(line.split()) > 1:
+            return f"{rule}; its cells seem to be separated by spaces: separate them by commas"
+        if all(map(_digits, headings)):
+            return f"{rule}: numbers; write headings above them, such as time,joint"
+        return f"{rule}; name the one with the times in time.column"
+
+    def _cells(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
+        numbers: list[int] = []
+
+        def counted() -> Iterator[str]:
+            for index in range(self.begin, len(lines)):
+                if not lines[index].lstrip().startswith(_COMMENT):
+                    numbers.append(index + 1)
+                    yield lines[index]
+
+        reader = csv.reader(counted(), delimiter=self.separator, strict=True)
+        try:
+            for cells in reader:
+                if any(cell.strip() for cell in cells):
+                    yield numbers[-1], cells
+        except csv.Error as error:
+            raise RecordingError(self._name, f"cannot be read as CSV: {error}") from None
+
+    def _fitted(self, line: int, cells: list[str]) -> list[str]:
+        """Return a line's cells, as many as headings: what is missing or more than those must be empty."""
+        count = len(self.headings)
+        row = [cell.strip() for cell in cells[:count]] + [""] * (count - len(cells))
+        if any(cell.strip() for cell in cells[count:]) or any(self.headings[len(cells) :]):
+            rule = f"line {line} has {len(cells)} cells, its headings are {count}"
+            if self.separator == "," and len(cells) > count and all(_digits(cell) for cell in cells):
+                rule += "; if its numbers have decimal commas, separate the cells by semicolons"
+            raise RecordingError(self._name, rule)
+        return row
+
+
+def _text(name: str, data: bytes) -> str:
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise RecordingError(name, "is UTF-16 text; save it as UTF-8")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise RecordingError(
+            name, f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save it as UTF-8"
+        ) from None
+
+
+def _holds_data(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith(_COMMENT)
+
+
+def is_excerpt(data: bytes) -> bool:
+    """Return whether a file says that it was cut out of another one."""
+    return data.startswith(f"# {EXCERPT} of ".encode())
+
+
+def _origin(line: str) -> dict[str, str]:
+    found = re.fullmatch(rf"# {EXCERPT} of (.*), sha256 ([0-9a-f]{{64}})\s*", line)
+    return {"name": found[1], "sha256": found[2]} if found else {}
+
+
+def _digits(cell: str) -> bool:
+    return bool(re.fullmatch(r"\s*[-+]?[0-9.]*\s*", cell))

@@ -1,0 +1,184 @@
+"""Joint logs in CSV: columns of numbers, with decimal points or commas, over times or dates."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from replay.errors import RecordingError
+from replay.logs.csv_table import Format, Table, unit_of
+from replay.logs.excerpt import EXCERPT
+from replay.logs.joint_log import JointLog, Series, leading_zeros, unrepeated
+from replay.logs.times import date_nanoseconds, nanoseconds
+
+_WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
+_WITH_POINT = re.compile(r"[-+]?[0-9]*\.[0-9]*([eE][-+]?[0-9]+)?")
+_DATE_LIKE = re.compile(r"[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4}|[0-9]{1,2}:[0-9]{2}")
+
+
+def read_csv(name: str, data: bytes, format: Format, needed: Collection[str], max_gap: int) -> JointLog:
+    """Return the columns of a CSV log by their headings.
+
+    Headings stand in the first line that is no comment, or in the last comment before the numbers. Empty lines,
+    comments (# or %) and columns without a heading are passed over; an empty cell is no sample; a line that is there
+    twice is one.
+
+    Args:
+        name: of the file, for messages.
+        data: its bytes, in UTF-8.
+        format: how it is written.
+        needed: headings of columns that must hold numbers; any other one that holds something else is passed over.
+        max_gap: longest time [ns] between samples that is bridged.
+
+    Raises:
+        RecordingError: the file is empty or not UTF-8, there is no such column, a line has another number of cells, or
+            a cell is no finite number, or a time beyond 146 years.
+    """
+    return _Log(name, Table(name, data, format), format, needed, max_gap).log()
+
+
+class _Log:
+    """The numbers of a table."""
+
+    def __init__(self, name: str, table: Table, format: Format, needed: Collection[str], max_gap: int) -> None:
+        self._name = name
+        self._table = table
+        self._format = format
+        self._needed = {h for h in table.headings if h in needed or _joint(h) in needed}
+        self._at = table.headings.index(table.time)
+        self._decimal = format.decimal or self._found_decimal()
+        self._unit = self._time_unit()
+        self._times = self._read_times()
+        self._skip = leading_zeros(self._times, max_gap)
+
+    def log(self) -> JointLog:
+        table, times = self._table, self._times
+        joints = {}
+        for column, heading in enumerate(table.headings):
+            if heading and column != self._at:
+                series = self._series(column, heading)
+                if series is not None:
+                    joints[heading] = series
+        if not joints:
+            raise RecordingError(self._name, "has no samples of joints")
+        first, last = self._skip, max(range(self._skip, len(times)), key=times.__getitem__)
+        later = (index for index in range(first, len(times)) if times[index] > times[first])
+        return JointLog(
+            joints=joints,
+            frames={},
+            begin=min(times[first:]),
+            end=times[last],
+            anchor=(first, *itertools.islice(later, 1), last),
+            left_out=self._skip,
+            cut=self._cut,
+            origin=table.origin,
+            published=False,
+        )
+
+    def _series(self, column: int, heading: str) -> Series | None:
+        """Return the samples of a column; None without any, or if it holds something else and is not needed."""
+        values, rows = [], []
+        for index in range(self._skip, len(self._times)):
+            cell = self._table.rows[index][column]
+            if not cell:
+                continue
+            value = _value(cell.replace(",", ".") if self._decimal == "," else cell)
+            if value is None:
+                if heading in self._needed:
+                    raise RecordingError(self._name, self._no_number(index, heading, cell))
+                return None
+            values.append(value)
+            rows.append(index)
+        if not rows:
+            return None
+        row = np.array(rows, dtype=np.int64)
+        time, position = np.array(self._times, dtype=np.int64)[row], np.array(values, dtype=np.float64) + 0.0
+        first = unrepeated(time, position)
+        return Series(time[first], position[first], row[first])
+
+    def _found_decimal(self) -> str:
+        """Return the sign between whole and decimal digits: a comma where numbers have one and none has a point."""
+        columns = [k for k, h in enumerate(self._table.headings) if h in self._needed or k == self._at]
+        cells = [(line, row[k]) for line, row in zip(self._table.lines, self._table.rows, strict=True) for k in columns]
+        comma = next((line for line, cell in cells if _WITH_COMMA.fullmatch(cell)), None)
+        point = next((line for line, cell in cells if _WITH_POINT.fullmatch(cell)), None)
+        if comma is not None and point is not None:
+            rule = f"has a decimal point in line {point} and a decimal comma in line {comma}; write one of the two"
+            raise RecordingError(self._name, rule)
+        return "." if comma is None else ","
+
+    def _time_unit(self) -> Fraction:
+        unit = self._format.unit or unit_of(self._table.time)[1]
+        return self._format.units.get(unit, self._format.units["s"])
+
+    def _read_times(self) -> list[int]:
+        times, zones = [], set()
+        for index, row in enumerate(self._table.rows):
+            cell = row[self._at]
+            try:
+                time = nanoseconds(cell.replace(",", ".") if self._decimal == "," else cell, self._unit)
+                kind = ""
+                if time is None:
+                    date = date_nanoseconds(cell)
+                    if date is None:
+                        raise RecordingError(self._name, self._no_number(index, self._table.time, cell))
+                    time, kind = date[0], "with" if date[1] else "without"
+            except OverflowError:
+                raise RecordingError(self._name, f"{self._place(index)}: {cell} is beyond 146 years") from None
+            except ValueError as error:
+                raise RecordingError(self._name, f"{self._place(index)}: {cell!r} is no date: {error}") from None
+            times.append(time)
+            zones.add(kind)
+            if len(zones) > 1:
+                told = "dates and numbers" if "" in zones else "dates with and without a time zone"
+                raise RecordingError(self._name, f"{self._place(index)}: times are {told}; write one of the two")
+        if zones - {""} and self._format.unit is not None:
+            raise RecordingError(self._name, "has dates as times, which time.unit has no effect on; leave it out")
+        if not times:
+            raise RecordingError(self._name, "has no samples of joints")
+        return times
+
+    def _place(self, index: int) -> str:
+        return f"line {self._table.lines[index]}, column {self._table.time!r}"
+
+    def _no_number(self, index: int, heading: str, cell: str) -> str:
+        rule = f"line {self._table.lines[index]}, column {heading!r}: {cell!r} is not a finite number"
+        if heading == self._table.time and _DATE_LIKE.match(cell):
+            return f"{rule} or a date such as 2024-05-01T12:00:00.5Z"
+        if "," in cell and "." in cell:
+            return f"{rule}; leave out the marks between thousands"
+        if "," in cell and self._decimal == ".":
+            return f"{rule}; if the comma is a decimal one, state decimal: ','"
+        if "." in cell and self._decimal == ",":
+            return f"{rule}; if the point is a decimal one, state decimal: '.'"
+        return rule
+
+    def _cut(self, rows: Sequence[int], origin: Mapping[str, str]) -> bytes:
+        """Return some lines and the columns that were needed, cell by cell as they are written."""
+        columns = [k for k, h in enumerate(self._table.headings) if k == self._at or h in self._needed]
+        out = io.StringIO()
+        out.write(f"# {EXCERPT} of {origin.get('name', '')}, sha256 {origin.get('sha256', '')}\n")
+        writer = csv.writer(out, delimiter=self._table.separator, lineterminator="\n")
+        writer.writerow([self._table.headings[k] for k in columns])
+        writer.writerows([[self._table.rows[index][k] for k in columns] for index in rows])
+        return out.getvalue().encode()
+
+
+def _joint(heading: str) -> str:
+    """Return the joint that a column of `replay export` holds the position of."""
+    return unit_of(heading)[0].removesuffix(" position")
+
+
+def _value(cell: str) -> float | None:
+    try:
+        value = math.nan if "_" in cell else float(cell)  # 1_000 is a number to Python only
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
