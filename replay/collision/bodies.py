@@ -48,7 +48,7 @@ class Bodies(NamedTuple):
     """B bodies as unions of convex sets under box trees, concatenated; tree entries count from each body's own start.
 
     The convex sets of body k are `set_first[k]:set_first[k + 1]`, its tree nodes `node_first[k]:node_first[k + 1]`,
-    and `probes[probe_first[k]:probe_first[k + 1]]` holds a point of each of its connected parts.
+    `probes[probe_first[k]:probe_first[k + 1]]` holds a point of each of its connected parts, and `closing` its caps.
     """
 
     sets: Sets
@@ -61,6 +61,8 @@ class Bodies(NamedTuple):
     reach: Floats  # (B,) [m], largest distance of a vertex from the link's origin
     probes: Floats  # (p, 3) [m]
     probe_first: Integers  # (B + 1,)
+    closing: Floats  # (c, 3, 3) [m], the caps of surfaces that are open but have an inside
+    closing_first: Integers  # (B + 1,)
 
 
 def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
@@ -88,6 +90,8 @@ def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
         reach=np.array([float(np.sqrt(np.sum(points**2, axis=1).max())) for points in vertices]),
         probes=np.concatenate(probes),
         probe_first=_starts(probes),
+        closing=np.concatenate([sets.closing for sets in several]),
+        closing_first=_starts([sets.closing for sets in several]),
     )
 
 

@@ -111,7 +111,8 @@ def _volume_error(solid: Solid, pieces: tuple[Array, ...]) -> float:
 def _protrusion(solid: Solid, pieces: tuple[Array, ...]) -> float:
     faces = np.ascontiguousarray(np.concatenate([_hull_triangles(piece) for piece in pieces]))
     slack = PROTRUSION_TOLERANCE * float(np.ptp(solid.vertices, axis=0).max())
-    return float(_furthest(faces, solid.triangles, triangle_tree(solid.triangles), solid.watertight, slack))
+    tree = triangle_tree(solid.triangles)
+    return float(_furthest(faces, solid.triangles, tree, solid.has_inside, np.ascontiguousarray(solid.closing), slack))
 
 
 def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
@@ -132,7 +133,7 @@ def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
 
 
 @kernel
-def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, slack: float) -> float:
+def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, closing: Array, slack: float) -> float:
     """Return the largest distance of a point of faces outside the body, at most slack below the true one.
 
     A part of a face is bounded in two ways: distance changes by no more than the way gone, so it is at most the
@@ -160,7 +161,7 @@ def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, slack: f
             reach, corner = np.sqrt(reach), np.sqrt(corner)
             if min(distance + reach, corner) <= best + slack:
                 continue
-            if closed and inside(m, triangles, tree) == 1:
+            if closed and inside(m, triangles, tree, closing) == 1:
                 distance = 0.0
             best = max(best, distance)
             if distance + reach <= best + slack or size + 4 > _STACK:
