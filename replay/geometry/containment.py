@@ -75,11 +75,12 @@ def contains(
         closing = caps(triangles)
         if not openness(triangles, closing).has_inside:
             return np.zeros(len(points), dtype=np.bool_)
-    return _contains(points, triangles, tree, np.ascontiguousarray(closing))
+    return each_inside(points, triangles, tree, np.ascontiguousarray(closing))
 
 
 @kernel
-def _contains(points: Array, triangles: Array, tree: Tree, closing: Array) -> NDArray[np.bool_]:
+def each_inside(points: Array, triangles: Array, tree: Tree, closing: Array) -> NDArray[np.bool_]:
+    """Return which points (m, 3) are inside, see `inside`."""
     result = np.empty(len(points), np.bool_)
     for k in range(len(points)):
         result[k] = inside(points[k], triangles, tree, closing) == 1

@@ -1,7 +1,8 @@
 """Approximate convex decomposition of concave bodies, with what the approximation costs, kept in the user's cache.
 
 The pieces are V-HACD's (Mamou 2016, package vhacdx): on voxels, so they differ from the body by about a voxel, and they
-bridge narrow gaps. They are one version of a body to compare with; the exact triangles are the default.
+bridge narrow gaps and fill closed cavities. They are one version of a body to compare with; the exact triangles are the
+default.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from replay.errors import InvalidValue
 from replay.geometry.closest import nearest_triangle, squared_distance_to_triangle
 from replay.geometry.containment import inside
 from replay.geometry.hull import convex_hull, to_unit_box
+from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import Tree, triangle_tree
+from replay.geometry.winding import corner_indices
 from replay.numerics.jit import kernel
 from replay.numerics.rows import distinct_rows
 
@@ -82,6 +85,14 @@ def decompose(solid: Solid) -> Decomposition:
         kept = Decomposition(pieces, _volume_error(solid, pieces), _protrusion(solid, pieces), _missed(solid, pieces))
         _write(entry, kept)
     return kept
+
+
+def closed_cavities(solid: Solid) -> int:
+    """Return how many cavities without an opening a solid has; the pieces of `decompose` fill them."""
+    points, faces = corner_indices(solid.triangles)
+    parts = find_parts(points, faces)
+    volumes = [signed_volume(solid.triangles[parts.label == part]) for part in np.flatnonzero(parts.closed).tolist()]
+    return sum(volume < 0.0 for volume in volumes)
 
 
 def _decompose(triangles: Array) -> tuple[Array, ...]:

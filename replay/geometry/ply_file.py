@@ -115,7 +115,5 @@ def _strips(_points: Floats, corners: Lists) -> Indices:
             found.append(triangles)
     result = np.concatenate(found)
     a, b, c = result.T
-    triangle: Indices = result[
-        (a != b) & (b != c) & (c != a)
-    ]  # a corner given twice turns the strip, and is no triangle
-    return triangle
+    kept: Indices = result[(a != b) & (b != c) & (c != a)]  # a corner given twice turns the strip, no more
+    return kept

@@ -47,6 +47,11 @@ class Solid:
         return self.watertight or len(self.closing) > 0
 
     @property
+    def closing_of_inside(self) -> Array | None:
+        """The caps of a body that has an inside, none if it is watertight; None where it has no inside."""
+        return self.closing if self.has_inside else None
+
+    @property
     def vertices(self) -> Array:
         """The distinct corners (v, 3) [m], sorted by coordinates."""
         return distinct_rows(self.triangles.reshape(-1, 3) + 0.0).rows  # + 0.0 makes -0.0 and 0.0 one

@@ -24,9 +24,9 @@ METHOD_REVISIONS: Final = {
     "distance.exact": 3,
     "distance.rays": 2,
     "distance.thesis": 2,
-    "capacitive.tree": 4,
-    "capacitive.exact": 3,
-    "capacitive.midpoint": 2,
+    "capacitive.tree": 5,
+    "capacitive.exact": 4,
+    "capacitive.midpoint": 3,
 }
 """Bumped when a method's results change beyond the shipped rules; recorded with every result."""
 
