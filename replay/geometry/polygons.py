@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.rows import distinct_rows
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -30,13 +32,45 @@ def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Seque
     if len(fans) == len(lengths) or fans.min() < 0 or fans.max() >= len(points):
         return fans  # triangles alone, or corners that are none, for who checks them
     folded = np.flatnonzero(_folded(points[fans], sizes))
-    if len(folded) == 0:
+    place = distinct_rows(points).kind
+    again = _again(place[corners], start, lengths)
+    if len(folded) == 0 and len(again) == 0:
         return fans
     several = np.split(fans, np.cumsum(sizes)[:-1])
+    polygons = np.split(corners, start[1:])
     for polygon in folded.tolist():
-        own = corners[start[polygon] : start[polygon] + lengths[polygon]]
-        several[polygon] = own[_ears(points[own])]
+        several[polygon] = polygons[polygon][_ears(points[polygons[polygon]])]
+    for polygon, earlier in again:
+        several[polygon] = _split_alike(polygons[polygon], several[earlier], place)
     return np.concatenate(several)
+
+
+def _again(places: Indices, start: Indices, lengths: Indices) -> list[tuple[int, int]]:
+    """Return which polygons of more than three corners have those of an earlier one, in either sense, and which one."""
+    mark = np.random.default_rng(1).integers(2**62, size=int(places.max(initial=0)) + 1, dtype=np.uint64)
+    total = np.add.reduceat(mark[places], start)  # equal where the corners are
+    first = np.unique(total, return_index=True, return_inverse=True)
+    earlier = first[1][first[2]]
+    found = []
+    for polygon in np.flatnonzero((earlier != np.arange(len(start))) & (lengths > 3)).tolist():
+        a, b = (places[start[k] : start[k] + lengths[k]].tolist() for k in (earlier[polygon], polygon))
+        if len(set(a)) == len(a) and a[0] in b:
+            turn = b.index(a[0])
+            if a in (b[turn:] + b[:turn], b[turn::-1] + b[:turn:-1]):
+                found.append((polygon, int(earlier[polygon])))
+    return found
+
+
+def _split_alike(polygon: Indices, triangles: Indices, place: Indices) -> Indices:
+    """Return a polygon's triangles with the diagonals of those of an earlier one, in its own sense.
+
+    A face that is there twice, once from each side, would else be four triangles that differ.
+    """
+    corner = {int(place[k]): int(k) for k in polygon}
+    found = np.array([[corner[int(place[k])] for k in triangle] for triangle in triangles], dtype=np.int64)
+    after = dict(zip(polygon.tolist(), np.roll(polygon, -1).tolist(), strict=True))
+    forward = any(after[int(a)] == int(b) for face in found for a, b in zip(face, np.roll(face, -1), strict=True))
+    return found if forward else found[:, ::-1]
 
 
 def _folded(triangles: Floats, sizes: Indices) -> NDArray[np.bool_]:

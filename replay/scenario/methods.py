@@ -19,7 +19,7 @@ METHOD_REVISIONS: Final = {
     "collision.narrowphase.gjk": 1,
     "collision.narrowphase.fcl": 1,
     "collision.pieces.exact": 2,
-    "collision.pieces.convex": 2,
+    "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
     "distance.exact": 3,
     "distance.rays": 2,

@@ -207,6 +207,23 @@ def test_polygons_that_are_not_convex_are_split_rightly():
     assert notched > 100
 
 
+def test_polygons_that_are_there_twice_are_split_alike():
+    """Each from its own first corner, the two sides of a quad would be four triangles that differ."""
+    own = CORNERS + CORNERS + b"v 0.5 1.2 0\n"  # a second set of the same corners
+    for face in ("4 3 2 1", "1 2 3 4", "3 4 1 2", "2 1 4 3", "9 8 7 6", "8 9 6 7"):
+        vertices, faces = read_faces("a.obj", own + b"f 1 2 3 4\nf 1 2 5\nf " + face.encode() + b"\n")
+        corners = {frozenset(map(tuple, triangle)) for triangle in vertices[faces].tolist()}
+        assert len(faces) == 5 and len(corners) == 3
+        normals = np.cross(vertices[faces][:, 1] - vertices[faces][:, 0], vertices[faces][:, 2] - vertices[faces][:, 0])
+        forward = face in ("1 2 3 4", "3 4 1 2", "8 9 6 7")
+        assert (normals[[0, 1], 2] > 0).all() and (normals[[3, 4], 2] > 0).all() == forward
+    crossed = read_faces("a.obj", own + b"f 1 2 3 4\nf 1 3 2 4\n")[1]  # the same corners, another polygon
+    assert len(crossed) == 4
+    u = "".join(f"v {corner} 0\n" for corner in U).encode() + b"f 1 2 3 4 5 6 7 8\nf 4 3 2 1 8 7 6 5\n"
+    vertices, faces = read_faces("u.obj", u)
+    assert len({frozenset(face) for face in faces.tolist()}) == 6 and len(faces) == 12
+
+
 DART = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]]
 
 
@@ -232,7 +249,7 @@ def ply(kind, faces, element="face", names="vertex_indices", points=DART, number
 def test_ply_of_any_polygons_is_read_as_its_header_says(kind, after, names, numbers):
     several = {"names": names, "after": after, "numbers": numbers}
     quads = read_faces("a.ply", ply(kind, [[0, 1, 2, 4], [4, 0, 1, 2]], **several))[1]
-    assert quads.tolist() == [[0, 1, 2], [0, 2, 4], [4, 0, 1], [4, 1, 2]]
+    assert quads.tolist() == [[0, 1, 2], [0, 2, 4]] * 2  # the same one, split alike
     vertices, faces = read_faces("a.ply", ply(kind, [[0, 1, 4], [0, 1, 2, 3, 4], [1, 2, 3, 4]], **several))
     np.testing.assert_array_equal(vertices, DART)
     assert faces.tolist()[0] == [0, 1, 4] and len(faces) == 6

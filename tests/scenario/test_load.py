@@ -141,12 +141,12 @@ def test_a_similar_file_is_proposed(tmp_path):
 def test_models_come_by_name_or_from_a_file(tmp_path):
     thesis = load_model("thesis2015")
     assert thesis.identity() == {
-        "collision.bounds": "obb_vertices@1",
+        "collision.bounds": "obb_vertices@2",
         "collision.narrowphase": "gjk@1",
         "collision.pieces": "convex@1",
         "collision.clearance": "never",
         "distance": "thesis@2",
-        "capacitive": "midpoint@2",
+        "capacitive": "midpoint@3",
         "capacitive.splits": "4",
     }
     assert load_text(HEAD + "links: {a: {}}\nmodel: thesis2015\n").model == thesis
