@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from replay.collision.pairs import CollisionBody
 from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
-from replay.geometry.bounds import fit_aabb, fit_obb, fit_sphere
+from replay.geometry.bounds import fit_aabb, fit_sphere, principal_obb
 from replay.geometry.convex import ConvexSets, convex_sets
 from replay.geometry.tree import Tree
 from replay.numerics.rows import distinct_rows
@@ -118,9 +118,9 @@ def fit_volumes(bodies: Sequence[CollisionBody], arrays: Bodies, *, bounds: Boun
             radius[k] = np.sqrt(3.0 * np.sum(half[k] ** 2)) * _INFLATION
             continue
         if bounds == "obb":
-            obb = fit_obb(points, triangles=body.solid.triangles if pieces == "exact" else None)
+            obb = principal_obb(points, triangles=body.solid.triangles if pieces == "exact" else None)
         elif bounds == "obb_vertices":
-            obb = fit_obb(points, method="vertices")
+            obb = principal_obb(points, method="vertices")
         else:
             raise InvalidValue("bounds", bounds, "must be one of obb, obb_vertices, aabb, sphere")
         center[k], half[k], axes[k] = obb.center, obb.half_widths, obb.axes

@@ -51,12 +51,13 @@ def _strip(scene: dict[str, Any]) -> None:
     for name in _LOOKS:
         scene.pop(name, None)
     for mesh in scene.get("meshes", ()):
+        mesh.pop("name", None)
         for primitive in mesh["primitives"]:
             for name in ("material", "targets", "extensions"):
                 primitive.pop(name, None)
             primitive["attributes"] = {"POSITION": primitive["attributes"]["POSITION"]}
     for node in scene.get("nodes", ()):
-        for name in ("skin", "camera", "weights"):
+        for name in ("skin", "camera", "weights", "name", "extras"):
             node.pop(name, None)
 
 
@@ -106,7 +107,10 @@ def _check_buffers(scene: dict[str, Any], binary: int) -> None:
         if view["byteLength"] < 0 or (inside and view.get("byteOffset", 0) + view["byteLength"] > binary):
             raise ValueError(f"buffer view {number} is beyond the {binary} bytes of its data")
     for number, accessor in enumerate(scene.get("accessors", ())):
-        row = _COMPONENT_BYTES[accessor["componentType"]] * _COMPONENTS[accessor["type"]]
+        kind, shape = accessor["componentType"], accessor["type"]
+        if kind not in _COMPONENT_BYTES or shape not in _COMPONENTS:
+            raise ValueError(f"accessor {number} is of a type that glTF does not know")
+        row = _COMPONENT_BYTES[kind] * _COMPONENTS[shape]
         if "bufferView" in accessor:
             view = views[accessor["bufferView"]]
             stride = view.get("byteStride", row)

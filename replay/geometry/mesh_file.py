@@ -87,7 +87,7 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
             warnings.simplefilter("ignore")
             return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False).to_mesh()
     except Exception as error:  # a foreign parser on a foreign file may raise anything
-        reason = " ".join(str(error).split()) or type(error).__name__
-        if isinstance(error, KeyError):
-            reason = f"it lacks the entry {reason}"
+        reason = " ".join(str(error).split())
+        if not reason or type(error).__module__ == "builtins":  # Python's words are none for people
+            reason = "what it holds does not fit together"
         raise MeshError(name, f"is not a usable {kind.upper()} file: {reason[:200]}{_ADVICE}") from error

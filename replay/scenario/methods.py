@@ -12,8 +12,8 @@ from replay.scenario.units import NUMBER, Quantity
 Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below=1.0)]
 
 METHOD_REVISIONS: Final = {
-    "collision.bounds.obb": 2,
-    "collision.bounds.obb_vertices": 2,
+    "collision.bounds.obb": 1,
+    "collision.bounds.obb_vertices": 1,
     "collision.bounds.aabb": 1,
     "collision.bounds.sphere": 1,
     "collision.narrowphase.gjk": 1,

@@ -302,6 +302,28 @@ def test_what_is_no_mesh_is_named(ending):
     assert len(read_faces(f"a{ending}", words.encode("utf-8-sig"))[1]) == 12
 
 
+def places(value, at=()):
+    """The way to every entry of a GLB's description."""
+    for key in value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ():
+        yield (*at, key)
+        yield from places(value[key], (*at, key))
+
+
+def test_a_damaged_description_is_refused_in_words_for_people():
+    size = int.from_bytes(WHOLE["box.glb"][12:16], "little")
+    ways = list(places(json.loads(WHOLE["box.glb"][20 : 20 + size])))
+    python = re.compile(r"object|subscript|iterable|hashable|Error|indices|None|reshape|'\w+'")
+    refusals = 0
+    for way in ways:
+        for value in (None, 3, -1, 99, "x", [], {}, [None], 1.5, True):
+            try:
+                read_faces("a.glb", glb(set_in(*way, value=value)))
+            except MeshError as error:
+                refusals += 1
+                assert not python.search(str(error)), (way, value, str(error))
+    assert refusals > 200
+
+
 def test_a_scene_of_several_parts_is_put_together():
     scene = trimesh.Scene()
     for x in (0.0, 3.0):

@@ -141,7 +141,7 @@ def test_a_similar_file_is_proposed(tmp_path):
 def test_models_come_by_name_or_from_a_file(tmp_path):
     thesis = load_model("thesis2015")
     assert thesis.identity() == {
-        "collision.bounds": "obb_vertices@2",
+        "collision.bounds": "obb_vertices@1",
         "collision.narrowphase": "gjk@1",
         "collision.pieces": "convex@1",
         "collision.clearance": "never",
