@@ -156,7 +156,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *covered.notes()),
+        notes=(*scene.notes, *covered.notes(), *(simulation.distance.notes() if simulation.distance else ())),
     )
 
 

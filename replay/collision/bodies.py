@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from replay.collision.pairs import CollisionBody
 from replay.collision.support import SETS_TYPE, Sets, make_sets
 from replay.errors import InvalidValue
-from replay.geometry.bounds import fit_aabb, fit_obb, fit_sphere
+from replay.geometry.bounds import fit_aabb, fit_sphere, principal_obb
 from replay.geometry.convex import ConvexSets, convex_sets
 from replay.geometry.tree import TREE_TYPE, Tree
 from replay.numerics.jit import record
@@ -53,7 +53,7 @@ class Bodies(NamedTuple):
     """B bodies as unions of convex sets under box trees, concatenated; tree entries count from each body's own start.
 
     The convex sets of body k are `set_first[k]:set_first[k + 1]`, its tree nodes `node_first[k]:node_first[k + 1]`,
-    and `probes[probe_first[k]:probe_first[k + 1]]` holds a point of each of its connected parts.
+    `probes[probe_first[k]:probe_first[k + 1]]` holds a point of each of its connected parts, and `closing` its caps.
     """
 
     sets: Sets
@@ -66,6 +66,8 @@ class Bodies(NamedTuple):
     reach: Floats  # (B,) [m], largest distance of a vertex from the link's origin
     probes: Floats  # (p, 3) [m]
     probe_first: Integers  # (B + 1,)
+    closing: Floats  # (c, 3, 3) [m], the caps of surfaces that are open but have an inside
+    closing_first: Integers  # (B + 1,)
 
 
 BODIES_TYPE = record(
@@ -79,6 +81,8 @@ BODIES_TYPE = record(
     boolean[::1],
     float64[::1],
     float64[:, ::1],
+    int64[::1],
+    float64[:, :, ::1],
     int64[::1],
 )
 
@@ -108,6 +112,8 @@ def collect(bodies: Sequence[CollisionBody], *, pieces: Pieces) -> Bodies:
         reach=np.array([float(np.sqrt(np.sum(points**2, axis=1).max())) for points in vertices]),
         probes=np.concatenate(probes),
         probe_first=_starts(probes),
+        closing=np.concatenate([sets.closing for sets in several]),
+        closing_first=_starts([sets.closing for sets in several]),
     )
 
 
@@ -134,9 +140,9 @@ def fit_volumes(bodies: Sequence[CollisionBody], arrays: Bodies, *, bounds: Boun
             radius[k] = np.sqrt(3.0 * np.sum(half[k] ** 2)) * _INFLATION
             continue
         if bounds == "obb":
-            obb = fit_obb(points, triangles=body.solid.triangles if pieces == "exact" else None)
+            obb = principal_obb(points, triangles=body.solid.triangles if pieces == "exact" else None)
         elif bounds == "obb_vertices":
-            obb = fit_obb(points, method="vertices")
+            obb = principal_obb(points, method="vertices")
         else:
             raise InvalidValue("bounds", bounds, "must be one of obb, obb_vertices, aabb, sphere")
         center[k], half[k], axes[k] = obb.center, obb.half_widths, obb.axes

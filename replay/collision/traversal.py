@@ -170,7 +170,7 @@ def _larger(half: Floats, i: int, j: int) -> bool:
 @entry(BODIES_TYPE, int64, int64, float64[:, ::1], float64[::1], boolean)
 @kernel
 def contains_part(bodies: Bodies, a: int, b: int, rotation: Floats, translation: Floats, from_b: bool) -> bool:
-    """Return whether body a's closed surface holds a connected part of b, the surfaces being apart.
+    """Return whether body a's surface holds a connected part of b, the surfaces being apart.
 
     Args:
         bodies: of the scene.
@@ -191,6 +191,7 @@ def contains_part(bodies: Bodies, a: int, b: int, rotation: Floats, translation:
     )
     begin, end = bodies.sets.first[sets], bodies.sets.first[sets_end]
     triangles = bodies.sets.vertices[begin:end].reshape((sets_end - sets, 3, 3))
+    closing = bodies.closing[bodies.closing_first[a] : bodies.closing_first[a + 1]]
     point = np.empty(3)
     for k in range(bodies.probe_first[b], bodies.probe_first[b + 1]):
         for axis in range(3):
@@ -200,6 +201,6 @@ def contains_part(bodies: Bodies, a: int, b: int, rotation: Floats, translation:
                     point[axis] += rotation[other, axis] * (bodies.probes[k, other] - translation[other])
                 else:
                     point[axis] += rotation[axis, other] * bodies.probes[k, other]
-        if inside(point, triangles, tree) == 1:
+        if inside(point, triangles, tree, closing) == 1:
             return True
     return False

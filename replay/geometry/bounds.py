@@ -17,7 +17,18 @@ from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
 from replay.numerics.rows import distinct_rows
 
-__all__ = ["Aabb", "Obb", "Sphere", "aabbs_meet", "fit_aabb", "fit_obb", "fit_sphere", "obbs_meet", "spheres_meet"]
+__all__ = [
+    "Aabb",
+    "Obb",
+    "Sphere",
+    "aabbs_meet",
+    "fit_aabb",
+    "fit_obb",
+    "fit_sphere",
+    "obbs_meet",
+    "principal_obb",
+    "spheres_meet",
+]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +38,9 @@ _ULPS = 8.0
 
 A difference and a dot product of three terms are off by at most 2 eps of the extent; once here, once for who checks.
 """
+
+_FLAT = 1e-14
+"""Boxes thinner than this, as a share of their extent, are compared as if they were as thick."""
 
 _LARGEST = 1e300
 
@@ -88,28 +102,17 @@ def fit_aabb(points: Array) -> Aabb:
     return Aabb(center, half_widths * (1.0 + _ULPS * _EPS))
 
 
-def fit_obb(
+def principal_obb(
     points: Array,
     *,
     triangles: NDArray[np.generic] | None = None,
     method: Literal["triangles", "vertices"] = "triangles",
 ) -> Obb:
-    """Return an oriented box around points along the principal axes of their covariance.
+    """Return the box around points along the principal axes of their covariance, which the level "bounds" means.
 
     Where eigenvalues nearly repeat (cube, cylinder, sphere) and the axes are not determined by the covariance, they are
-    those of the smallest box found; see `obb_fit`.
-
-    Args:
-        points: (n, 3) [m], n >= 1.
-        triangles: the surface that weights the covariance, as indices (t, 3) into points or as coordinates (t, 3, 3)
-            [m]; without it, that of the points' convex hull.
-        method: "triangles": covariance of the surface; "vertices": covariance of the points, wherever they are dense.
-
-    Raises:
-        InvalidValue: as `fit_sphere`; indices out of range; another method.
-
-    Accuracy: half widths exceed those the axes ask for by 1e-14 of the extent at most; the volume of boxes around cube,
-    cylinder, sphere, octahedron and tetrahedron is within 1 % of the smallest known (test_obb).
+    those of the smallest box found; see `obb_fit`. Of 2000 random sets it is larger than the box along the coordinate
+    axes for 201, up to 1.65 times; see `fit_obb`, whose arguments and errors it has.
     """
     if method not in ("triangles", "vertices"):
         raise InvalidValue("method", method, "must be triangles or vertices")
@@ -131,6 +134,40 @@ def fit_obb(
     if not area > 0.0:
         covariance = covariance_of_points(local)
     return _tight(points, local, origin, scale, box_axes(local, hull, covariance))
+
+
+def fit_obb(
+    points: Array,
+    *,
+    triangles: NDArray[np.generic] | None = None,
+    method: Literal["triangles", "vertices"] = "triangles",
+) -> Obb:
+    """Return an oriented box around points: `principal_obb`, or the box along the coordinate axes where it is smaller.
+
+    Args:
+        points: (n, 3) [m], n >= 1.
+        triangles: the surface that weights the covariance, as indices (t, 3) into points or as coordinates (t, 3, 3)
+            [m]; without it, that of the points' convex hull.
+        method: "triangles": covariance of the surface; "vertices": covariance of the points, wherever they are dense.
+
+    Raises:
+        InvalidValue: as `fit_sphere`; indices out of range; another method.
+
+    Accuracy: half widths exceed those the axes ask for by 1e-14 of the extent at most; the box is never larger than
+        that of `fit_aabb`, beyond rounding (test_obb_is_never_larger); the volume of boxes around cube, cylinder,
+        sphere, octahedron and tetrahedron is within 1 % of the smallest known (test_obb).
+    """
+    box = principal_obb(points, triangles=triangles, method=method)
+    local, origin, scale = to_unit_box(_checked("points", points))
+    if _volume(local, np.eye(3)) < _volume(local, box.axes) * (1.0 - _ULPS * _EPS):
+        return _tight(_checked("points", points), local, origin, scale, np.eye(3))
+    return box
+
+
+def _volume(local: Array, axes: Array) -> float:
+    """Return the volume of the box along axes around points of extent 1; flat boxes are compared by their area."""
+    reach = _along(local[:, None], axes.T)
+    return float(np.prod(np.maximum(reach.max(axis=0) - reach.min(axis=0), _FLAT)))
 
 
 def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array) -> Obb:

@@ -1,7 +1,9 @@
-"""Whether a point is inside a closed surface of triangles.
+"""Whether a point is inside a surface of triangles.
 
-A ray from the point crosses the surface: outwards counts +1, inwards -1, and the point is inside iff the sum is not 0.
-Signed counting (rather than parity) keeps the overlap of two bodies in one mesh inside, and a cavity outside.
+A ray from the point crosses the surface: outwards counts +1, inwards -1, and the sum is how often a closed surface
+winds about the point, which is inside iff that is not 0. Signed counting (rather than parity) keeps the overlap of two
+bodies in one mesh inside, and a cavity outside. Of an open surface the ray counts its caps too, whose own winding
+number is then taken off (see `closing`): the point is inside iff what remains is beyond 1/2.
 
 With the point at the origin, the line along d crosses the triangle a, b, c iff the three volumes
     U = d . (b x c),   V = d . (c x a),   W = d . (a x b)
@@ -21,6 +23,8 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.closest import distance_to_surface
+from replay.geometry.closing import caps, openness
+from replay.geometry.solid_angle import winding_number
 from replay.geometry.tree import MAX_DEPTH, Tree, triangle_tree
 from replay.numerics.jit import kernel
 
@@ -45,13 +49,16 @@ def _directions(count: int) -> Array:
 _DIRECTIONS = _directions(8)
 
 
-def contains(triangles: Array, points: Array, *, tree: Tree | None = None) -> NDArray[np.bool_]:
-    """Return which points are inside, or within rounding of, a closed surface.
+def contains(
+    triangles: Array, points: Array, *, tree: Tree | None = None, closing: Array | None = None
+) -> NDArray[np.bool_]:
+    """Return which points are inside, or within rounding of, a surface; none are in a sheet.
 
     Args:
-        triangles: (n, 3, 3) watertight, wound one way [m].
+        triangles: (n, 3, 3) wound one way [m].
         points: (m, 3) [m].
         tree: `triangle_tree(triangles)` if it is at hand.
+        closing: `caps(triangles)` if they are at hand, of a surface that has an inside; none of a closed one.
 
     Raises:
         InvalidValue: wrong shapes or values that are not finite.
@@ -64,50 +71,48 @@ def contains(triangles: Array, points: Array, *, tree: Tree | None = None) -> ND
         raise InvalidValue("points", points.shape, "must have shape (m, 3) and be finite")
     if tree is None:
         tree = triangle_tree(triangles)
-    return _contains(points, triangles, tree)
+    if closing is None:
+        closing = caps(triangles)
+        if not openness(triangles, closing).has_inside:
+            return np.zeros(len(points), dtype=np.bool_)
+    return each_inside(points, triangles, tree, np.ascontiguousarray(closing))
 
 
 @kernel
-def _contains(points: Array, triangles: Array, tree: Tree) -> NDArray[np.bool_]:
+def each_inside(points: Array, triangles: Array, tree: Tree, closing: Array) -> NDArray[np.bool_]:
+    """Return which points (m, 3) are inside, see `inside`."""
     result = np.empty(len(points), np.bool_)
     for k in range(len(points)):
-        result[k] = inside(points[k], triangles, tree) == 1
+        result[k] = inside(points[k], triangles, tree, closing) == 1
     return result
 
 
 @kernel
-def inside(point: Array, triangles: Array, tree: Tree) -> int:
-    """Return 1 if the point (3,) is inside the closed surface triangles (n, 3, 3) or on it within rounding, else 0."""
+def inside(point: Array, triangles: Array, tree: Tree, closing: Array) -> int:
+    """Return 1 if the point (3,) is inside the surface triangles (n, 3, 3), or on it within rounding, else 0.
+
+    `closing` (m, 3, 3) holds the caps that close it. What is outside the surface's box is outside.
+    """
     for axis in range(3):
         if not (tree.lower[0, axis] <= point[axis] <= tree.upper[0, axis]):
             return 0
     for k in range(len(_DIRECTIONS)):
         crossings = _crossings(point, _DIRECTIONS[k], triangles, tree)
-        if crossings != _UNSURE:
+        for t in range(len(closing)):
+            if crossings != _UNSURE:
+                crossing = _crossing(point, _DIRECTIONS[k], closing[t])
+                crossings = crossings + crossing if crossing != _UNSURE else _UNSURE
+        if crossings == _UNSURE:
+            continue
+        if len(closing) == 0:
             return 1 if crossings != 0 else 0
+        return 1 if abs(crossings - winding_number(point, closing)) > 0.5 else 0
     magnitude = 0.0
     for axis in range(3):
         magnitude = max(magnitude, abs(tree.lower[0, axis]), abs(tree.upper[0, axis]))
     if distance_to_surface(point, triangles, tree) <= 64.0 * _EPS * magnitude:
         return 1
     return 1 if abs(winding_number(point, triangles)) > 0.5 else 0
-
-
-@kernel
-def winding_number(point: Array, triangles: Array) -> float:
-    """Return how often the surface triangles (n, 3, 3) winds about the point: the sum of solid angles / 4 pi."""
-    total = 0.0
-    for t in range(len(triangles)):
-        ax, ay, az = triangles[t, 0] - point
-        bx, by, bz = triangles[t, 1] - point
-        cx, cy, cz = triangles[t, 2] - point
-        a = math.sqrt(ax * ax + ay * ay + az * az)
-        b = math.sqrt(bx * bx + by * by + bz * bz)
-        c = math.sqrt(cx * cx + cy * cy + cz * cz)
-        volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-        ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
-        total += 2.0 * math.atan2(volume, a * b * c + ab * c + bc * a + ca * b)
-    return total / (4.0 * math.pi)
 
 
 @kernel

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.geometry.closing import NO_CAPS
 from replay.geometry.hull import extreme_points
 from replay.geometry.solid import Solid
 from replay.geometry.tree import Tree, build_tree
@@ -21,13 +22,15 @@ class ConvexSets(NamedTuple):
     """A body as the union of m convex sets (convex pieces, or the triangles of its surface), in its link's frame.
 
     Set k is the convex hull of `vertices[first[k]:first[k + 1]]`. `surface` says that the sets are the surface
-    triangles of a watertight body, so that a body wholly inside another needs a point-in-solid test beside them.
+    triangles of a body that has an inside, so that a body wholly inside another needs a point-in-solid test beside
+    them; `closing` are the caps of one that is not watertight, see `Solid`.
     """
 
     vertices: NDArray[np.float64]  # (v, 3) [m]
     first: NDArray[np.int64]  # (m + 1,)
     tree: Tree  # over the sets' boxes
     surface: bool
+    closing: NDArray[np.float64]  # (c, 3, 3) [m]
 
 
 def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "exact") -> ConvexSets:
@@ -68,6 +71,7 @@ def from_pieces(pieces: Sequence[Array]) -> ConvexSets:
         first=first,
         tree=build_tree(lower, upper, leaf_size=1),
         surface=False,
+        closing=NO_CAPS,
     )
 
 
@@ -77,5 +81,6 @@ def _from_triangles(solid: Solid) -> ConvexSets:
         vertices=triangles.reshape(-1, 3),
         first=np.arange(0, 3 * len(triangles) + 1, 3, dtype=np.int64),
         tree=build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=1),
-        surface=solid.watertight,
+        surface=solid.has_inside,
+        closing=solid.closing,
     )

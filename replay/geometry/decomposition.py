@@ -1,7 +1,8 @@
 """Approximate convex decomposition of concave bodies, with what the approximation costs, kept in the user's cache.
 
 The pieces are V-HACD's (Mamou 2016, package vhacdx): on voxels, so they differ from the body by about a voxel, and they
-bridge narrow gaps. They are one version of a body to compare with; the exact triangles are the default.
+bridge narrow gaps and fill closed cavities. They are one version of a body to compare with; the exact triangles are the
+default.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from replay.errors import InvalidValue
 from replay.geometry.closest import nearest_triangle, squared_distance_to_triangle
 from replay.geometry.containment import inside
 from replay.geometry.hull import convex_hull, to_unit_box
+from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
+from replay.geometry.winding import corner_indices
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
 
@@ -85,6 +88,14 @@ def decompose(solid: Solid) -> Decomposition:
     return kept
 
 
+def closed_cavities(solid: Solid) -> int:
+    """Return how many cavities without an opening a solid has; the pieces of `decompose` fill them."""
+    points, faces = corner_indices(solid.triangles)
+    parts = find_parts(points, faces)
+    volumes = [signed_volume(solid.triangles[parts.label == part]) for part in np.flatnonzero(parts.closed).tolist()]
+    return sum(volume < 0.0 for volume in volumes)
+
+
 def _decompose(triangles: Array) -> tuple[Array, ...]:
     import vhacdx
 
@@ -112,7 +123,8 @@ def _volume_error(solid: Solid, pieces: tuple[Array, ...]) -> float:
 def _protrusion(solid: Solid, pieces: tuple[Array, ...]) -> float:
     faces = np.ascontiguousarray(np.concatenate([_hull_triangles(piece) for piece in pieces]))
     slack = PROTRUSION_TOLERANCE * float(np.ptp(solid.vertices, axis=0).max())
-    return float(_furthest(faces, solid.triangles, triangle_tree(solid.triangles), solid.watertight, slack))
+    tree = triangle_tree(solid.triangles)
+    return float(_furthest(faces, solid.triangles, tree, solid.has_inside, np.ascontiguousarray(solid.closing), slack))
 
 
 def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
@@ -132,9 +144,9 @@ def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
     return float(outside.max())
 
 
-@entry(float64[:, :, ::1], float64[:, :, ::1], TREE_TYPE, boolean, float64)
+@entry(float64[:, :, ::1], float64[:, :, ::1], TREE_TYPE, boolean, float64[:, :, ::1], float64)
 @kernel
-def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, slack: float) -> float:
+def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, closing: Array, slack: float) -> float:
     """Return the largest distance of a point of faces outside the body, at most slack below the true one.
 
     A part of a face is bounded in two ways: distance changes by no more than the way gone, so it is at most the
@@ -162,7 +174,7 @@ def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, slack: f
             reach, corner = np.sqrt(reach), np.sqrt(corner)
             if min(distance + reach, corner) <= best + slack:
                 continue
-            if closed and inside(m, triangles, tree) == 1:
+            if closed and inside(m, triangles, tree, closing) == 1:
                 distance = 0.0
             best = max(best, distance)
             if distance + reach <= best + slack or size + 4 > _STACK:

@@ -9,12 +9,17 @@ import numpy as np
 from numba import float64
 from numpy.typing import NDArray
 
-from replay.errors import InvalidValue, MeshError
+from replay.errors import InvalidValue, MeshError, count
+from replay.geometry.closing import NO_CAPS, Openness, caps, openness
+from replay.geometry.copies import copies
 from replay.geometry.hull import extreme_points, to_unit_box
 from replay.geometry.mesh_file import read_faces
-from replay.geometry.solid import Solid, signed_volume
+from replay.geometry.outward import Turned, inside_out
+from replay.geometry.parts import find_parts
+from replay.geometry.solid import Solid
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
-from replay.geometry.winding import corner_indices, repeated, topology, wound_against_neighbours
+from replay.geometry.weld import weld
+from replay.geometry.winding import Indices, Topology, corner_indices, topology
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
 
@@ -85,37 +90,80 @@ def solid_from_triangles(triangles: Array) -> Solid:
     if without_area:
         notes.append(f"{without_area} of {len(triangles)} triangles have no area and were dropped")
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
-    faces = corner_indices(triangles)
-    again = repeated(faces) & ~flat
-    given, left = topology(faces), topology(faces[~again])
-    if given.open_edges == 0 and given < left:
-        again[:] = False  # closed bodies that share a face: each of them needs its own
-    repeats = int(np.count_nonzero(again))
-    if repeats:
-        notes.append(f"{repeats} of {len(triangles)} triangles repeat another one and were dropped")
-        triangles, faces, flat = triangles[~again], faces[~again], flat[~again]
-    dropped = without_area + repeats
+    points, faces = corner_indices(triangles)
     joints = topology(faces)
-    if joints.open_edges == 0 and joints.reversed_edges:
-        turned = wound_against_neighbours(faces)
-        faces[turned] = faces[turned][:, [0, 2, 1]]
-        if topology(faces).is_closed:
-            joints = topology(faces)
-            triangles[turned] = triangles[turned][:, [0, 2, 1]]
-            notes.append(f"{np.count_nonzero(turned)} triangles were wound against their neighbours and turned over")
-    triangles = np.ascontiguousarray(triangles[~flat])
-    if joints.open_edges:
-        notes.append(f"not watertight: {joints.open_edges} edges are open; it has no inside, only a surface")
-    elif joints.reversed_edges:
-        notes.append(
-            f"not watertight: neighbouring triangles are wound against each other along {joints.reversed_edges} edges"
-        )
+    if not joints.is_closed:
+        taken_for = weld(points, faces, flat)
+        welded = int(np.count_nonzero(taken_for != np.arange(len(points))))
+        if welded:
+            faces = taken_for[faces]
+            triangles, before, joints = points[faces], joints, topology(faces)
+            notes.append(_on_welding(points, taken_for, before, joints))
+    again = copies(faces)
+    repeats = int(np.count_nonzero(again & ~flat))
+    if again.any():
+        if repeats:
+            rule = "repeat another one, in either sense, and were dropped"
+            notes.append(f"{repeats} of {len(triangles)} triangles {rule}")
+        triangles, faces, flat = triangles[~again], faces[~again], flat[~again]
+        joints = topology(faces)
+    parts = find_parts(points, faces)
+    if parts.turned.any():
+        faces = np.where(parts.turned[:, None], faces[:, [0, 2, 1]], faces)
+        count = int(np.count_nonzero(parts.turned & ~flat))
+        joints = topology(faces)
+        notes.append(f"{count} triangles were wound against their neighbours and turned over")
+    triangles, kept = points[faces[~flat]], parts._replace(label=parts.label[~flat])
+    turned = inside_out(triangles, kept)
+    triangles = np.where(turned.faces[:, None, None], triangles[:, [0, 2, 1]], triangles)
+    if turned.inside_out:
+        notes.append(_on_turning(turned))
+    triangles = np.ascontiguousarray(triangles)
     watertight = joints.is_closed
-    if watertight and signed_volume(triangles) < 0.0:
-        triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
-        notes.append("inside out (its volume is negative): the triangles were turned over")
+    closing = NO_CAPS
+    if not watertight:
+        closing = caps(triangles)
+        found = openness(triangles, closing)
+        closing = closing if found.has_inside else NO_CAPS
+        notes.append(_on_openness(joints, found))
     pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
-    return Solid(triangles, pieces=pieces, watertight=watertight, dropped=dropped, notes=tuple(notes))
+    dropped = without_area + repeats
+    return Solid(triangles, pieces=pieces, watertight=watertight, closing=closing, dropped=dropped, notes=tuple(notes))
+
+
+def _on_welding(points: Array, taken_for: Indices, before: Topology, after: Topology) -> str:
+    moved = points - points[taken_for]
+    furthest = float(np.sqrt(np.max(np.sum(moved * moved, axis=1))))
+    which = count(int(np.count_nonzero(taken_for != np.arange(len(points)))), "corner")
+    edges = count(_not_joined(before) - _not_joined(after), "edge")
+    return f"{which} at most {furthest:.2g} m from another one were taken for it, which closed {edges}"
+
+
+def _not_joined(joints: Topology) -> int:
+    return joints.open_edges + joints.crowded_edges
+
+
+def _on_turning(turned: Turned) -> str:
+    if turned.outermost == 1:
+        return "inside out (its volume is negative): the triangles were turned over"
+    return f"{turned.inside_out} of {turned.outermost} parts were inside out (of negative volume) and turned over"
+
+
+def _on_openness(joints: Topology, found: Openness) -> str:
+    reasons = []
+    if joints.open_edges:
+        reasons.append(f"{count(joints.open_edges, 'edge')} {'is' if joints.open_edges == 1 else 'are'} open")
+    if joints.crowded_edges:
+        verb = "belongs" if joints.crowded_edges == 1 else "belong"
+        reasons.append(f"{count(joints.crowded_edges, 'edge')} {verb} to more than two triangles, an odd number")
+    if joints.reversed_edges:
+        edges = count(joints.reversed_edges, "edge")
+        reasons.append(f"neighbouring triangles are wound against each other along {edges}")
+    what = f"not watertight: {', '.join(reasons)}; "
+    if not found.has_inside:
+        return f"{what}it has no inside, only a surface"
+    defect = f"{found.largest:.2g}" if found.largest > 1e-9 else "0"
+    return f"{what}inside is where the winding number is above 1/2; its largest defect on the surface is {defect}"
 
 
 def _have_area(triangles: Array) -> NDArray[np.bool_]:

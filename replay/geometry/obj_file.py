@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
 from array import array
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.polygons import NOT_CONVEX, first_folded
+from replay.geometry.polygons import triangulate
 
 
 def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the vertices (v, 3) and the triangles (f, 3) of an OBJ file.
 
-    Polygons are split into triangles that share their first corner. Groups, objects, normals, textures, colours,
-    materials, points and lines are passed over.
+    Polygons are split, see `polygons`. Groups, objects, normals, textures, colours, materials, points and lines are
+    passed over.
 
     Raises:
-        ValueError: a vertex or a face is not as the format says, or a polygon is not convex; with its line.
+        ValueError: a vertex or a face is not as the format says; with its line.
     """
     vertices, corners = array("d"), array("q")
-    sizes, lines = array("q"), array("q")  # of each face, its triangles and its line
+    lengths = array("q")  # corners of each face
     text = data.decode(errors="replace").replace("\r\n", "\n")  # comments and names may be in any encoding
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), start=1):
         words = line.partition("#")[0].split()
@@ -32,23 +31,18 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
                 x, y, z = map(float, words[1:4])
                 vertices.extend((x, y, z))
                 continue
-            first, *others = (_index(word, len(vertices) // 3) for word in words[1:])
-            if len(others) < 2:
+            polygon = [_index(word, len(vertices) // 3) for word in words[1:]]
+            if len(polygon) < 3:
                 raise ValueError("a face needs three corners")
-            sizes.append(len(others) - 1)
-            lines.append(number)
-            for second, third in itertools.pairwise(others):
-                corners.extend((first, second, third))
+            corners.extend(polygon)
+            lengths.append(len(polygon))
         except (ValueError, OverflowError):
             what = "three numbers" if words[0] == "v" else "three or more vertices, counted from 1"
             raise ValueError(f"line {number}, {line.strip()[:60]!r}, does not name {what}") from None
-    faces = np.array(corners, dtype=np.int64).reshape(-1, 3)
-    if len(faces) and faces.max() >= len(vertices) // 3:
-        raise ValueError(f"a face refers to vertex {faces.max() + 1}, and there are {len(vertices) // 3}")
     points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    if len(faces) > len(sizes) and (folded := first_folded(points[faces], np.array(sizes))) is not None:
-        raise ValueError(f"the polygon of line {lines[folded]} {NOT_CONVEX}")
-    return points, faces
+    if len(corners) and max(corners) >= len(points):
+        raise ValueError(f"a face refers to vertex {max(corners) + 1}, and there are {len(points)}")
+    return points, triangulate(points, corners, lengths)
 
 
 def _index(word: str, before: int) -> int:

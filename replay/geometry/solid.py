@@ -22,6 +22,7 @@ class Solid:
         pieces: vertex sets (k, 3) [m] whose convex hulls' union is the solid: one for a convex shape; () for a concave
             one that is to be collided by its triangles.
         watertight: whether the triangles close a volume.
+        closing: (m, 3, 3) caps [m] of triangles that do not but have an inside all the same, see `geometry.closing`.
         chord_error: largest distance [m] of the triangles from the curved surface they stand for; 0 for flat faces.
         dropped: degenerate and repeated triangles dropped on import.
         notes: what a reader of the scenario should know about an imported mesh, one sentence each.
@@ -30,6 +31,7 @@ class Solid:
     triangles: Array
     pieces: tuple[Array, ...] = ()
     watertight: bool = True
+    closing: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
     chord_error: float = 0.0
     dropped: int = 0
     notes: tuple[str, ...] = field(default=())
@@ -38,6 +40,16 @@ class Solid:
     def is_convex(self) -> bool:
         """Whether one convex set is the whole solid."""
         return len(self.pieces) == 1
+
+    @property
+    def has_inside(self) -> bool:
+        """Whether points can be inside: it is watertight, or nearly so."""
+        return self.watertight or len(self.closing) > 0
+
+    @property
+    def closing_of_inside(self) -> Array | None:
+        """The caps of a body that has an inside, none if it is watertight; None where it has no inside."""
+        return self.closing if self.has_inside else None
 
     @property
     def vertices(self) -> Array:
@@ -53,7 +65,8 @@ class Solid:
         """Return the solid moved by the rigid transform T (4, 4)."""
         T = np.asarray(T, dtype=np.float64)
         pieces = tuple(transforms.apply(T, piece) for piece in self.pieces)
-        return replace(self, triangles=transforms.apply(T, self.triangles), pieces=pieces)
+        triangles, closing = transforms.apply(T, self.triangles), transforms.apply(T, self.closing)
+        return replace(self, triangles=triangles, closing=closing, pieces=pieces)
 
 
 def signed_volume(triangles: Array) -> float:

@@ -18,15 +18,15 @@ METHOD_REVISIONS: Final = {
     "collision.bounds.sphere": 1,
     "collision.narrowphase.gjk": 1,
     "collision.narrowphase.fcl": 1,
-    "collision.pieces.exact": 1,
+    "collision.pieces.exact": 2,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
     "distance.exact": 3,
     "distance.rays": 2,
     "distance.thesis": 2,
-    "capacitive.tree": 4,
-    "capacitive.exact": 3,
-    "capacitive.midpoint": 2,
+    "capacitive.tree": 5,
+    "capacitive.exact": 4,
+    "capacitive.midpoint": 3,
 }
 """Bumped when a method's results change beyond the shipped rules; recorded with every result."""
 

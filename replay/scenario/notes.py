@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from replay.errors import Problem
+from replay.errors import Problem, count
 from replay.scenario.expectations import Between, PairExpectation
 
 if TYPE_CHECKING:
+    from replay.collision.pairs import CollisionBody
     from replay.scenario.model import Scenario
 
 
@@ -34,6 +36,26 @@ def notes(scenario: Scenario) -> list[Problem]:
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, Between) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    return found
+
+
+def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:
+    """Return what convex pieces cost each body that they only approximate, one line each."""
+    if pieces != "convex":
+        return []
+    from replay.geometry.decomposition import closed_cavities, decompose
+
+    found = []
+    for body in bodies:
+        if body.solid.pieces:
+            continue
+        parts, cavities = decompose(body.solid), closed_cavities(body.solid)
+        costs = [] if math.isnan(parts.volume_error) else [f"{100.0 * parts.volume_error:+.2g} % of its volume"]
+        costs.append(f"up to {parts.protrusion:.2g} m beyond its surface")
+        costs.append(f"up to {parts.missed:.2g} m of it missed")
+        if cavities:
+            costs.append("a closed cavity filled" if cavities == 1 else f"{cavities} closed cavities filled")
+        found.append(f"{body.name} collides as {count(len(parts.pieces), 'convex piece')}: {', '.join(costs)}")
     return found
 
 

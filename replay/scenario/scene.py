@@ -24,7 +24,7 @@ from replay.scenario.load import load_model
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
-from replay.scenario.notes import notes
+from replay.scenario.notes import notes, piece_notes
 from replay.scenario.script import linkage, script, transform
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
@@ -146,7 +146,10 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
     distance = tuple(_distance_sensor(scenario, machine, name) for name in sorted(sensors.distance))
     capacitive = tuple(_capacitive_sensor(scenario, machine, name) for name in sorted(sensors.capacitive))
     sensed = [shape for shape in scene_shapes if shape.sensed] if distance or capacitive else []
-    targets = tuple(make_target(shape.name, shape.link, shape.solid.triangles) for shape in sensed)
+    targets = tuple(
+        make_target(shape.name, shape.link, shape.solid.triangles, closing=shape.solid.closing_of_inside)
+        for shape in sensed
+    )
     names = tuple(target.name for target in targets)
     layout = Layout(
         links=machine.link_names,
@@ -172,7 +175,11 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         distance_sensors=distance,
         capacitive_sensors=capacitive,
         layout=layout,
-        notes=(*(note.message for note in notes(scenario)), *mesh_notes),
+        notes=(
+            *(note.message for note in notes(scenario)),
+            *mesh_notes,
+            *piece_notes(bodies, model.collision.pieces),
+        ),
     )
 
 

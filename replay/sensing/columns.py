@@ -56,7 +56,7 @@ class CapacitiveColumns:
         per_object: (n, C, O) [F], what each sensed shape contributes; 0 for shapes the sensor ignores.
         output_voltage: (n, C) [V]; 0 when saturated.
         delta_output: (n, C) [V], supply minus output voltage.
-        saturated: (n, C) bool, the integral is infinite.
+        saturated: (n, C) bool, the integral is infinite, or a plate is in a sensed body, or flush and facing into it.
         touching: (n, C) bool, a sensed shape and a plate have a point in common.
     """
 

@@ -22,21 +22,25 @@ class Target:
         link: index of the link that carries the shape.
         triangles: (n, 3, 3) corners in the link's frame [m], n >= 1, counter-clockwise seen from outside.
         tree: over the triangles, in the link's frame.
+        closing: (m, 3, 3) the caps [m] of a body that has an inside, none if it is closed; None: it has no inside. See
+            `geometry.closing`.
     """
 
     name: str
     link: int
     triangles: Array
     tree: Tree
+    closing: Array | None = None
 
 
-def make_target(name: str, link: int, triangles: ArrayLike) -> Target:
+def make_target(name: str, link: int, triangles: ArrayLike, *, closing: Array | None = None) -> Target:
     """Return the target of a shape.
 
     Args:
         name: "link/shape".
         link: index of the link that carries the shape, 0 or more.
         triangles: (n, 3, 3) corners in the link's frame [m], finite, n >= 1.
+        closing: see `Target`.
 
     Raises:
         InvalidValue: wrong shape, no triangles, a coordinate that is not finite, a negative link.
@@ -48,4 +52,4 @@ def make_target(name: str, link: int, triangles: ArrayLike) -> Target:
         raise InvalidValue(f"{name}.triangles", "an array with NaN or infinity", "must be finite")
     if link < 0:
         raise InvalidValue(f"{name}.link", link, "must be the index of a link, 0 or more")
-    return Target(name, link, corners, triangle_tree(corners))
+    return Target(name, link, corners, triangle_tree(corners), closing)

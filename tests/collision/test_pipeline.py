@@ -10,6 +10,7 @@ from replay.collision.pipeline import CollisionPipeline
 from replay.collision.relative import RelativePoses
 from replay.errors import InvalidValue
 from replay.geometry.containment import contains
+from replay.geometry.mesh import solid_from_triangles
 from replay.geometry.primitives import arc, cube, cuboid, cylinder, plane, sphere
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
@@ -189,6 +190,23 @@ def test_a_body_wholly_inside_another_is_in_contact():
             chosen, there = (solids[::-1], poses[:, ::-1]) if turned else (solids, poses)
             columns = scenes.run(chosen, there, clearance="near")
             assert (columns.level[:, 0] == 2).tolist() == [k == 2 for k in order]
+
+
+def test_a_body_wholly_inside_a_mesh_with_a_hole_is_in_contact_and_one_beside_a_sheet_is_not():
+    # a ball in the middle of a cube that lacks a triangle read no contact
+    holed = solid_from_triangles(np.delete(sphere(1.0, 0.05).triangles, 7, axis=0))
+    sheet = solid_from_triangles(cube(2.0).triangles[:2])
+    closed = Solid(sphere(1.0, 0.05).triangles)
+    poses = transforms.identity(3, 2)
+    poses[:, :, :3, 3] = np.random.default_rng(4).normal(size=(3, 1, 3))
+    poses[:, 1, 0, 3] += [0.1, 0.2, 3.0]
+    small = Solid(cube(0.1).triangles)
+    for solids, order in (((closed, small), [2, 2, 0]), ((holed, small), [2, 2, 0]), ((sheet, small), [0, 0, 0])):
+        for chosen, there in ((solids, poses), (solids[::-1], poses[:, ::-1])):
+            columns = scenes.run(chosen, there, clearance="near")
+            assert (columns.level[:, 0] == 2).tolist() == [k == 2 for k in order]
+    both = scenes.run((closed, holed, small), np.insert(poses, 1, poses[:, 0], axis=1), clearance="near")
+    assert (both.level == 2).all(axis=1).tolist() == [True, True, False]
 
 
 def test_far_from_the_world_origin_reads_the_same():

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from replay.errors import InvalidValue
 from replay.geometry import primitives
 from replay.geometry.closest import distance_to_surface
-from replay.geometry.containment import contains, inside, winding_number
+from replay.geometry.closing import NO_CAPS
+from replay.geometry.containment import contains, inside
 from replay.geometry.mesh import load_mesh
 from replay.geometry.solid import Solid
+from replay.geometry.solid_angle import winding_number
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
 
@@ -120,4 +122,4 @@ def test_bad_input() -> None:
     for points in (np.zeros(3), np.zeros((2, 2)), np.full((1, 3), np.nan)):
         with pytest.raises(InvalidValue):
             contains(cube.triangles, points)
-    assert inside(np.full(3, np.nan), cube.triangles, triangle_tree(cube.triangles)) == 0
+    assert inside(np.full(3, np.nan), cube.triangles, triangle_tree(cube.triangles), NO_CAPS) == 0

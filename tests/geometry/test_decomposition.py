@@ -12,7 +12,7 @@ from replay.errors import InvalidValue
 from replay.geometry import decomposition, primitives
 from replay.geometry.containment import contains
 from replay.geometry.convex import convex_sets
-from replay.geometry.decomposition import decompose
+from replay.geometry.decomposition import closed_cavities, decompose
 from replay.geometry.mesh import load_mesh, solid_from_triangles
 from replay.geometry.solid import Solid
 
@@ -103,3 +103,10 @@ def test_open_and_flat_bodies() -> None:
     sheet = primitives.plane((1.0, 1.0)).triangles
     with pytest.raises(InvalidValue):
         decompose(solid_from_triangles(sheet))
+
+
+def test_closed_cavities_are_counted() -> None:
+    cube = primitives.cube(1.0).triangles
+    hollow = np.concatenate([cube, 0.3 * cube[:, ::-1] + 0.1, 0.1 * cube[:, ::-1] - 0.3, 0.1 * cube + 0.1])
+    for triangles, cavities in ((cube, 0), (hollow, 2), (hollow[:, ::-1], 2), (np.delete(hollow, 12, axis=0), 1)):
+        assert closed_cavities(solid_from_triangles(triangles)) == cavities

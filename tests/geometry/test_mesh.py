@@ -9,9 +9,11 @@ import trimesh
 
 from replay.errors import InvalidValue, MeshError
 from replay.geometry import primitives
+from replay.geometry.containment import contains
 from replay.geometry.convex import convex_sets
 from replay.geometry.mesh import load_mesh, solid_from_triangles
 from replay.geometry.solid import Solid
+from replay.numerics import transforms
 
 PHANTOMS = Path(find_spec("pyskindose").submodule_search_locations[0]) / "phantom_data"
 
@@ -80,7 +82,8 @@ def test_repairs_are_noted() -> None:
 
     hole = solid_from_triangles(cube.triangles[1:])
     assert not hole.watertight and "3 edges are open" in hole.notes[0] and hole.pieces == ()
-    assert not convex_sets(hole).surface
+    sheet = solid_from_triangles(cube.triangles[:2])
+    assert not convex_sets(sheet).surface and "it has no inside, only a surface" in sheet.notes[0]
 
     point, line = np.ones((1, 3, 3)), np.array([[[0.0, 0, 0], [1, 1, 1], [3, 3, 3]]])
     padded = solid_from_triangles(np.concatenate([cube.triangles, point]))
@@ -95,9 +98,21 @@ def test_repeated_triangles_count_once() -> None:
         solid = solid_from_triangles(np.concatenate([cube, more]))
         np.testing.assert_array_equal(solid.triangles, cube)
         assert solid.watertight and solid.is_convex and solid.dropped == len(more)
-        assert solid.notes == (f"{len(more)} of {12 + len(more)} triangles repeat another one and were dropped",)
-    sheet = np.concatenate([cube[:2], cube[:2, ::-1]])  # the two sides of a sheet repeat nothing
-    assert len(solid_from_triangles(sheet).triangles) == 4
+        assert solid.notes == (
+            f"{len(more)} of {12 + len(more)} triangles repeat another one, in either sense, and were dropped",
+        )
+
+
+@pytest.mark.parametrize("copies", [1, 2, 3])
+def test_copies_in_the_other_sense_count_once_too(copies: int) -> None:
+    # a sheet or a box exported double-sided read exactly twice the capacitance, and the box lost its inside
+    cube = primitives.cube(1.0).triangles
+    for single in (cube[:2], cube[:7], cube, cube[[0, 3, 6, 9]]):
+        for part in (slice(None), slice(0, 1), slice(1, None)):
+            several = np.concatenate([single, *[single[part, :: (-1) ** (k + 1)] for k in range(copies)]])
+            solid = solid_from_triangles(several)
+            np.testing.assert_array_equal(solid.triangles, solid_from_triangles(single).triangles)
+            assert "in either sense" in solid.notes[0]
 
 
 def test_closed_bodies_that_share_a_face_keep_both() -> None:
@@ -107,6 +122,79 @@ def test_closed_bodies_that_share_a_face_keep_both() -> None:
     assert pair.watertight and len(pair.triangles) == 24 and pair.volume == pytest.approx(3.0)
     twice = solid_from_triangles(np.concatenate([low, low]))
     assert twice.watertight and len(twice.triangles) == 12
+    beside = low + np.array([1.0, 0.0, 0.0])
+    row = np.concatenate([low, beside, beside + np.array([1.0, 0.0, 0.0])])
+    rng = np.random.default_rng(3)
+    for bodies in (row, np.concatenate([row, row[:, ::-1]]), np.concatenate([row, row])):
+        for order in (np.arange(len(bodies)), rng.permutation(len(bodies))):
+            solid = solid_from_triangles(bodies[order])
+            assert solid.watertight and len(solid.triangles) == 36 and solid.volume == pytest.approx(3.0)
+
+
+BOX = primitives.cube(2.0).triangles
+
+
+def boxes(*parts: tuple[float, float, int]) -> np.ndarray:
+    """Boxes of half the size about (x, 0, 0), wound outwards (1) or inwards (-1)."""
+    return np.concatenate([half * BOX[:, ::sense] + np.array([x, 0.0, 0.0]) for x, half, sense in parts])
+
+
+@pytest.mark.parametrize(
+    ("parts", "volume", "inside", "outside", "note"),
+    [
+        ([(0, 1, 1), (4, 1, -1)], 16, [0, 4], [2], "1 of 2 parts were inside out"),
+        ([(0, 1, -1), (4, 0.5, 1)], 9, [0, 4], [2], "1 of 2 parts were inside out"),
+        ([(0, 1, -1), (4, 1, -1), (8, 1, 1)], 24, [0, 4, 8], [2, 6], "2 of 3 parts were inside out"),
+        ([(0, 1, 1), (1.5, 1, -1)], 16, [-0.5, 0.75, 2], [3], "1 of 2 parts were inside out"),  # overlap
+        ([(0, 3, -1), (0, 2, 1)], 152, [2.5], [0, 1.5], "inside out (its volume"),  # a cavity
+        ([(0, 3, 1), (0, 2, 1)], 280, [0, 2.5], [4], ""),  # solid in solid
+        ([(0, 3, -1), (0, 2, 1), (0, 1, -1)], 160, [0, 2.5], [1.5], "inside out (its volume"),
+        ([(0, 3, -1), (0, 2, 1), (9, 3, 1), (9, 2, -1)], 304, [2.5, 11.5], [0, 9], "1 of 2 parts were inside out"),
+        ([(0, 1, 1), (2, 1, -1)], 16, [0, 2], [3.5], "1 of 2 parts were inside out"),  # they share a wall
+    ],
+)
+def test_each_outermost_part_is_turned_by_itself(parts, volume, inside, outside, note) -> None:
+    for turned in (False, True):
+        mesh = boxes(*parts)
+        solid = solid_from_triangles(mesh[::-1] if turned else mesh)
+        assert solid.watertight and solid.volume == pytest.approx(volume)
+        assert note in "".join(solid.notes) and bool(solid.notes) == bool(note)
+        points = np.array([[x + 0.01, 0.02, 0.03] for x in [*inside, *outside]])
+        assert contains(solid.triangles, points).tolist() == [True] * len(inside) + [False] * len(outside)
+
+
+def test_bodies_that_touch_along_an_edge_or_a_corner_are_turned_each_by_itself() -> None:
+    for way in ((2.0, 2.0, 0.0), (2.0, 2.0, 2.0)):
+        solid = solid_from_triangles(np.concatenate([BOX, BOX[:, ::-1] + np.array(way)]))
+        assert solid.watertight and solid.volume == pytest.approx(16.0)
+
+
+@pytest.mark.parametrize("step", [1e-17, 1e-15, 1e-12, 1e-9, 4e-7])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+def test_corners_parted_by_rounding_are_one(step: float, size: float) -> None:
+    # 20 of 90 open public meshes were open only by it, and a ball in the middle of a cube was not seen
+    cube = primitives.cube(1.0).triangles + 0.5
+    rng = np.random.default_rng(8)
+    parted = size * (cube + step * rng.choice([0.0, 0.0, 1.0], cube.shape))
+    solid = solid_from_triangles(parted)
+    assert solid.watertight and solid.volume == pytest.approx(size**3, rel=1e-5)
+    assert contains(solid.triangles, size * np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]])).tolist() == [True, False]
+    if not np.array_equal(parted, size * cube):
+        assert "were taken for it, which closed" in solid.notes[0]
+
+
+def test_features_are_not_welded_away() -> None:
+    cube = primitives.cube(1.0).triangles
+    sheets = np.concatenate([cube[:2], cube[:2] + np.array([0.0, 0.0, 1e-7])])  # two walls of a thin gap
+    crumb = np.concatenate([cube[2:], 1e-7 * cube[2:] + np.array([2.0, 0.0, 0.0])])  # an open body of 0.1 um
+    plate = primitives.cuboid((1.0, 1.0, 1e-7)).triangles[1:]
+    strip = np.array([[[x, 0, 0], [x + 1e-7, 0, 0], [x, 1e-7, 0]] for x in 1e-7 * np.arange(50.0)])
+    for mesh in (sheets, crumb, plate, np.concatenate([cube[:2], strip])):
+        solid = solid_from_triangles(mesh)
+        np.testing.assert_array_equal(np.sort(solid.triangles.ravel()), np.sort(mesh.ravel()))
+        assert not any("taken for" in note for note in solid.notes)
+    apart = np.concatenate([cube[:2], cube[:2] + np.array([1.0 + 1e-5, 0.0, 0.0])])  # 1e-5 is no rounding
+    assert "8 edges are open" in solid_from_triangles(apart).notes[0]
 
 
 def test_winding_is_repaired() -> None:
@@ -121,6 +209,89 @@ def test_winding_is_repaired() -> None:
         solid = solid_from_triangles(mixed)
         assert solid.watertight and f"{turned.sum()} triangles were wound against" in solid.notes[0]
         assert solid.volume == pytest.approx(solid_from_triangles(whole).volume, rel=1e-12)
+
+
+def t_junctions(rng: np.random.Generator) -> np.ndarray:
+    """A box whose faces are cut each for itself, so that hardly an edge of two faces is one."""
+    parts = []
+    for face in primitives.cube(1.0).triangles:
+        for _ in range(3):
+            a, b, c = np.roll(face, rng.integers(3), axis=0)
+            middle = a + rng.uniform(0.2, 0.8) * (b - a)
+            parts.append([a, middle, c])
+            face = np.array([middle, b, c])
+        parts.append(face)
+    return np.array(parts)
+
+
+def test_a_mesh_that_is_not_closed_has_an_inside_where_it_winds_about_it() -> None:
+    cube, ball = primitives.cube(1.0).triangles, primitives.sphere(0.5, 1e-3).triangles
+    turned = transforms.apply(transforms.from_rpy(np.array([0.3, 0.4, 0.5])), ball)
+    shells = [body[(sign * body[..., 2]).min(axis=1) > -0.1] for sign, body in ((1, ball), (-1, turned))]
+    fin = np.array([[[0.0, 0, 0.5], [0.3, 0, 0.5], [0.0, 0, 1.0]]])
+    rng = np.random.default_rng(1)
+    meshes = {
+        "a triangle is missing": (cube[1:], 0.05, 0.15),
+        "small holes": (np.delete(ball, rng.integers(len(ball), size=20), axis=0), 0.001, 0.5),
+        "T-junctions": (t_junctions(rng), 0.0, 1e-9),
+        "overlapping shells": (np.concatenate(shells), 0.0, 0.5),
+        "a fin": (np.concatenate([cube, fin]), 0.45, 0.5),
+        "inside out": (cube[1:, ::-1], 0.05, 0.15),
+        "a triangle is wound the other way": (np.concatenate([cube[1:5], cube[5:6, ::-1], cube[6:]]), 0.05, 0.15),
+    }
+    points = rng.uniform(-0.7, 0.7, (1000, 3))
+    for name, (mesh, least, most) in meshes.items():
+        solid = solid_from_triangles(mesh)
+        assert not solid.watertight and solid.has_inside, name
+        note = solid.notes[-1]
+        assert "inside is where the winding number is above 1/2; its largest defect" in note, name
+        assert least <= float(note.rsplit(" ", 1)[1]) <= most, note
+        winding = np.array([solid_angles(solid.triangles, point) for point in points])
+        sure = np.abs(winding - 0.5) > 1e-9
+        expected = winding > 0.5
+        assert 0.1 < expected.mean() < 0.7
+        np.testing.assert_array_equal(contains(solid.triangles, points)[sure], expected[sure], err_msg=name)
+        moved = solid.transformed(transforms.from_rpy(np.array([0.3, -0.2, 1.0])))
+        turned = transforms.apply(transforms.from_rpy(np.array([0.3, -0.2, 1.0])), points)
+        found = contains(moved.triangles, turned, closing=moved.closing)
+        np.testing.assert_array_equal(found[sure], expected[sure], err_msg=name)
+        assert convex_sets(solid).surface
+
+
+def solid_angles(triangles: np.ndarray, point: np.ndarray) -> float:
+    """The winding number, by spherical triangles: the sum of the angles between great circles, less pi."""
+    a, b, c = np.moveaxis((triangles - point) / np.linalg.norm(triangles - point, axis=2)[..., None], 1, 0)
+
+    def angle(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
+        u, v = np.cross(p, q), np.cross(p, r)
+        return np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.sum(u * v, axis=1))
+
+    area = angle(a, b, c) + angle(b, c, a) + angle(c, a, b) - np.pi
+    return float(np.sum(np.sign(np.sum(a * np.cross(b, c), axis=1)) * area) / (4.0 * np.pi))
+
+
+def test_a_sheet_has_no_inside() -> None:
+    x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    grid = np.stack([x, y, 0.2 * np.sin(3 * x)], axis=2)
+    corners = [grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]]
+    wavy = np.concatenate([np.stack(corners[:3], axis=2), np.stack([corners[k] for k in (0, 2, 3)], axis=2)])
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (500, 3))
+    for sheet in (primitives.cube(1.0).triangles[:1], primitives.cube(1.0).triangles[:2], wavy.reshape(-1, 3, 3)):
+        solid = solid_from_triangles(sheet)
+        assert not solid.has_inside and "it has no inside, only a surface" in solid.notes[-1]
+        on_it = solid.triangles.mean(axis=1)
+        assert not contains(solid.triangles, np.concatenate([points, on_it])).any()
+
+
+def test_notes_say_what_keeps_a_mesh_from_being_closed() -> None:
+    cube = primitives.cube(1.0).triangles
+    fin = np.array([[[-0.5, -0.5, 0.5], [0.5, -0.5, 0.5], [0.0, -0.5, 1.0]]])
+    wall = np.array([cube[0, 0], cube[0, 1], [0.3, 0.1, 0.2]])[None]
+    assert (
+        "2 edges are open, 1 edge belongs to more than two triangles, an odd number;"
+        in (solid_from_triangles(np.concatenate([cube, fin])).notes[0])
+    )
+    assert "edges are open, 1 edge belongs to" in solid_from_triangles(np.concatenate([cube, wall])).notes[0]
 
 
 def test_one_sided_surface_is_not_watertight() -> None:

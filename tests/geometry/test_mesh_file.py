@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from replay.errors import MeshError
+from replay.geometry import glb_file
 from replay.geometry.mesh_file import FORMATS, read_faces
 
 BOX = trimesh.creation.box()
@@ -162,46 +163,165 @@ def test_obj_counts_back_from_where_a_face_stands_and_splits_polygons():
 U = ["0 0", "3 0", "3 2", "2 2", "2 1", "1 1", "1 2", "0 2"]
 
 
-def test_obj_polygons_are_convex_or_refused():
-    """A profile like the letter U, split from its first corner, would be filled."""
+def covered(vertices, faces):
+    """The area (3,) with its direction, and the area without: a fold would make the second one larger."""
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normals = 0.5 * np.cross(b - a, c - a)
+    return normals.sum(axis=0), np.linalg.norm(normals, axis=1).sum()
+
+
+def star(points, rng):
+    """A polygon seen wholly from its middle, in any plane, some corners of which are notches."""
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    angle = 2 * np.pi * (np.arange(points) + rng.uniform(0.0, 0.9, points)) / points
+    flat = rng.uniform(0.2, 1.0, points)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return flat @ turn[:2] * 10.0 ** rng.uniform(-6, 6)
+
+
+def test_polygons_that_are_not_convex_are_split_rightly():
+    """A profile like the letter U, split from its first corner, would be filled; so would stars, in any plane."""
     corners = "".join(f"v {corner} 0\n" for corner in U).encode()
-    assert "line 9 is not convex" in refused("u.obj", corners + b"f 1 2 3 4 5 6 7 8\n")
-    quads = corners + b"f 1 6 7 8\nf 1 2 5 6\nf 2 3 4 5\n"
-    assert trimesh.Trimesh(*read_faces("u.obj", quads)).area == pytest.approx(5.0)
+    for start in range(8):
+        order = b" ".join(str((start + k) % 8 + 1).encode() for k in range(8))
+        normal, area = covered(*read_faces("u.obj", corners + b"f " + order + b"\n"))
+        assert normal.tolist() == pytest.approx([0, 0, 5.0]) and area == pytest.approx(5.0)
+        normal, area = covered(*read_faces("u.obj", corners + b"f " + order[::-1] + b"\n"))
+        assert normal.tolist() == pytest.approx([0, 0, -5.0]) and area == pytest.approx(5.0)
     straight = corners + b"v 1.5 0 0\nf 1 9 2 5 6\n"  # a corner on an edge
     assert trimesh.Trimesh(*read_faces("u.obj", straight)).area == pytest.approx(2.0)
+    rng = np.random.default_rng(6)
+    notched = 0
+    for _ in range(300):
+        count = int(rng.integers(4, 40))
+        points = star(count, rng)
+        rows = "".join("v {:.17g} {:.17g} {:.17g}\n".format(*point) for point in points)
+        vertices, faces = read_faces("star.obj", f"{rows}f {' '.join(str(k + 1) for k in range(count))}\n".encode())
+        middle = points.mean(axis=0)
+        whole = 0.5 * np.sum(np.cross(points - middle, np.roll(points, -1, axis=0) - middle), axis=0)
+        normal, area = covered(vertices, faces)
+        fan = covered(points, np.array([[0, k, k + 1] for k in range(1, count - 1)]))[1]
+        size = np.linalg.norm(whole)
+        np.testing.assert_allclose(normal, whole, atol=1e-9 * size)
+        assert area == pytest.approx(size, rel=1e-9) and len(faces) == count - 2
+        notched += fan > 1.001 * size
+    assert notched > 100
 
 
-@pytest.mark.parametrize("names", [b"vertex_indices", b"vertex_index"])
-def test_ply_polygons_are_convex_or_refused(names):
-    """A quad with a notch and the letter U; convex faces around them are no reason."""
-    points = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]]
-    rows = "".join(f"{x} {y} {z}\n" for x, y, z in points).encode()
-    head = b"ply\nformat ascii 1.0\n" + QUADS.replace(b"vertex 4", b"vertex 5").replace(b"vertex_indices", names)
-    text = head.replace(b"FACES", b"2") + rows
-    assert "face 2 is not convex" in refused("a.ply", text + b"3 0 1 4\n5 0 1 2 3 4\n")
-    assert "face 1 is not convex" in refused("a.ply", text + b"4 1 2 3 4\n3 0 1 4\n")
-    assert len(read_faces("a.ply", text + b"4 3 0 1 2\n3 0 3 4\n")[1]) == 3  # the notch is the first corner
-    assert "face 2 has fewer than three corners" in refused("a.ply", text + b"4 0 1 2 4\n2 0 1\n")
-    for wrong in (b"9", b"-9"):  # an index that is none is for the mesh to refuse
-        assert int(wrong) in read_faces("a.ply", text + b"4 0 1 2 " + wrong + b"\n3 0 1 4\n")[1]
-    binary = head.replace(b"FACES", b"1").replace(b"ascii", b"binary_little_endian")
-    coordinates = np.array(points, np.float32).tobytes()
-    assert "face 1 is not convex" in refused("a.ply", binary + coordinates + struct.pack("<B4i", 4, 1, 2, 3, 4))
-    assert len(read_faces("a.ply", binary + coordinates + struct.pack("<B4i", 4, 0, 1, 2, 4))[1]) == 2
+def test_polygons_that_are_there_twice_are_split_alike():
+    """Each from its own first corner, the two sides of a quad would be four triangles that differ."""
+    own = CORNERS + CORNERS + b"v 0.5 1.2 0\n"  # a second set of the same corners
+    for face in ("4 3 2 1", "1 2 3 4", "3 4 1 2", "2 1 4 3", "9 8 7 6", "8 9 6 7"):
+        vertices, faces = read_faces("a.obj", own + b"f 1 2 3 4\nf 1 2 5\nf " + face.encode() + b"\n")
+        corners = {frozenset(map(tuple, triangle)) for triangle in vertices[faces].tolist()}
+        assert len(faces) == 5 and len(corners) == 3
+        normals = np.cross(vertices[faces][:, 1] - vertices[faces][:, 0], vertices[faces][:, 2] - vertices[faces][:, 0])
+        forward = face in ("1 2 3 4", "3 4 1 2", "8 9 6 7")
+        assert (normals[[0, 1], 2] > 0).all() and (normals[[3, 4], 2] > 0).all() == forward
+    crossed = read_faces("a.obj", own + b"f 1 2 3 4\nf 1 3 2 4\n")[1]  # the same corners, another polygon
+    assert len(crossed) == 4
+    u = "".join(f"v {corner} 0\n" for corner in U).encode() + b"f 1 2 3 4 5 6 7 8\nf 4 3 2 1 8 7 6 5\n"
+    vertices, faces = read_faces("u.obj", u)
+    assert len({frozenset(face) for face in faces.tolist()}) == 6 and len(faces) == 12
 
 
-def test_ply_of_quads_is_read_and_mixed_polygons_only_as_text():
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
-    quad, triangle = struct.pack("<B4i", 4, 0, 1, 2, 3), struct.pack("<B3i", 3, 0, 1, 2)
-    head = b"ply\nformat binary_little_endian 1.0\n" + QUADS
-    assert len(read_faces("a.ply", head.replace(b"FACES", b"1") + corners.tobytes() + quad)[1]) == 2
-    mixed = head.replace(b"FACES", b"2") + corners.tobytes() + quad + triangle
-    assert "differ in their number of corners" in refused("a.ply", mixed)
-    text = (
-        b"ply\nformat ascii 1.0\n" + QUADS.replace(b"FACES", b"2") + b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n"
+DART = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]]
+
+
+def ply(kind, faces, element="face", names="vertex_indices", points=DART, numbers="float", after=""):
+    """A PLY file of text, little or big endian, whose faces may be of any length."""
+    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[kind]
+    head = f"ply\nformat {kind} 1.0\ncomment made for a test\nelement vertex {len(points)}\n"
+    head += "".join(f"property {numbers} {axis}\n" for axis in "xyz") + "property uchar red\n"
+    head += f"element {element} {len(faces)}\nproperty list uchar int {names}\n{after}end_header\n"
+    if not order:
+        rows = [*(f"{x!r} {y!r} {z!r} 7" for x, y, z in points), *(f"{len(f)} {' '.join(map(str, f))}" for f in faces)]
+        rows = [*rows[: len(points)], *(row + " 9" * bool(after) for row in rows[len(points) :])]
+        return head.encode() + "\n".join(rows).encode() + b"\n"
+    body = b"".join(struct.pack(order + ("3fB" if numbers == "float" else "3dB"), *point, 7) for point in points)
+    for face in faces:
+        body += struct.pack(f"{order}B{len(face)}i", len(face), *face) + (b"\x09" if after else b"")
+    return head.encode() + body
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("after", ["", "property uchar flags\n"])
+@pytest.mark.parametrize(("names", "numbers"), [("vertex_indices", "float"), ("vertex_index", "double")])
+def test_ply_of_any_polygons_is_read_as_its_header_says(kind, after, names, numbers):
+    several = {"names": names, "after": after, "numbers": numbers}
+    quads = read_faces("a.ply", ply(kind, [[0, 1, 2, 4], [4, 0, 1, 2]], **several))[1]
+    assert quads.tolist() == [[0, 1, 2], [0, 2, 4]] * 2  # the same one, split alike
+    vertices, faces = read_faces("a.ply", ply(kind, [[0, 1, 4], [0, 1, 2, 3, 4], [1, 2, 3, 4]], **several))
+    np.testing.assert_array_equal(vertices, DART)
+    assert faces.tolist()[0] == [0, 1, 4] and len(faces) == 6
+    for one, area in (([0, 1, 2, 3, 4], 2.5), ([4, 3, 2, 1, 0], 2.5), ([3, 4, 0, 1, 2], 2.5)):
+        normal, whole = covered(*read_faces("a.ply", ply(kind, [one], **several)))
+        assert abs(normal[2]) == pytest.approx(area) and whole >= area
+    assert "face 2 has fewer than three corners" in refused("a.ply", ply(kind, [[0, 1, 2, 4], [0, 1]], **several))
+    for wrong in (9, -9):  # an index that is none is for the mesh to refuse
+        assert wrong in read_faces("a.ply", ply(kind, [[0, 1, 2, wrong], [0, 1, 4]], **several))[1]
+    whole = ply(kind, [[0, 1, 4], [0, 1, 2, 3]], **several)
+    for cut in range(1, 30) if kind != "ascii" else (2, 5, 8):
+        assert "announces" in refused("a.ply", whole[:-cut])
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_strips_of_triangles_turn_every_second_one(kind):
+    data = ply(kind, [[0, 1, 2, 4, 3, -1, 4, 3, 2], [0, 1, 1, 2, 4]], element="tristrips")
+    expected = [[0, 1, 2], [2, 1, 4], [2, 4, 3], [4, 3, 2], [1, 2, 4]]
+    assert read_faces("a.ply", data)[1].tolist() == expected
+
+
+def test_pictures_are_never_loaded():
+    """A GLB of 310 kB unfolded to 7 GiB, and a PLY that names a picture ended in a traceback."""
+    texture = ply("ascii", [[0, 1, 2]]).replace(b"made for a test", b"TextureFile skin.png")
+    assert len(read_faces("a.ply", texture)[1]) == 1
+    assert len(read_faces("a.obj", b"mtllib none.mtl\nusemtl skin\n" + CORNERS + b"f 1 2 3\n")[1]) == 1
+
+    def with_picture(scene):
+        scene["images"] = [{"bufferView": 0, "mimeType": "image/png"}, {"uri": "missing.png"}]
+        scene["textures"] = [{"source": 0}, {"source": 1}]
+        scene["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}]
+        scene["meshes"][0]["primitives"][0]["material"] = 0
+
+    data = glb(with_picture)
+    assert b"images" in data and not any(word in glb_file.bare(data) for word in (b"images", b"material", b"texture"))
+    np.testing.assert_array_equal(read_faces("a.glb", data)[1], read_faces("box.glb", WHOLE["box.glb"])[1])
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_is_no_mesh_is_named(ending):
+    pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a21\nsize 12345\n"
+    assert refused(f"a{ending}", pointer).endswith(
+        "is a Git LFS pointer, not the mesh itself; fetch it with: git lfs pull"
     )
-    assert len(read_faces("a.ply", text)[1]) == 3
+    if ending == ".glb":
+        return
+    words = {".stl": exported("stl_ascii"), ".obj": WHOLE["box.obj"], ".ply": WHOLE["text.ply"]}[ending].decode()
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be"):
+        assert "is UTF-16 text; save it as UTF-8" in refused(f"a{ending}", words.encode(encoding))
+    assert len(read_faces(f"a{ending}", words.encode("utf-8-sig"))[1]) == 12
+
+
+def places(value, at=()):
+    """The way to every entry of a GLB's description."""
+    for key in value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ():
+        yield (*at, key)
+        yield from places(value[key], (*at, key))
+
+
+def test_a_damaged_description_is_refused_in_words_for_people():
+    size = int.from_bytes(WHOLE["box.glb"][12:16], "little")
+    ways = list(places(json.loads(WHOLE["box.glb"][20 : 20 + size])))
+    python = re.compile(r"object|subscript|iterable|hashable|Error|indices|None|reshape|'\w+'")
+    refusals = 0
+    for way in ways:
+        for value in (None, 3, -1, 99, "x", [], {}, [None], 1.5, True):
+            try:
+                read_faces("a.glb", glb(set_in(*way, value=value)))
+            except MeshError as error:
+                refusals += 1
+                assert not python.search(str(error)), (way, value, str(error))
+    assert refusals > 200
 
 
 def test_a_scene_of_several_parts_is_put_together():

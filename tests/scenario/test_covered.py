@@ -24,6 +24,20 @@ sensors:
 def test_a_sensor_on_a_part_that_it_does_not_ignore_is_noted(tmp_path):
     scenario = load_sources("mounted.yaml", {"mounted.yaml": TEXT.encode()})
     result = run_case(CaseOrder(scenario, tmp_path, rrd=False), lambda done, total: None)
-    assert result.notes == (
-        "distance sensor 'on' touches arm/box in every frame; let it ignore that link, or move it out",
+    assert result.notes[0] == (
+        "distance sensor 'on' touches arm/box in every frame; let it ignore that link, or move it out"
+    )
+
+
+def test_a_sensor_inside_a_body_reads_its_surface_and_says_so(tmp_path):
+    text = TEXT.replace(
+        "away: {link: eye, pose: {xyz: [0, 0, 0.1]}", "away: {link: eye, ignore: [arm], pose: {xyz: [0, 0, 0.1]}"
+    )
+    text = text.replace("slab: {type: cuboid, size: [1, 1, 0.1]}", "slab: {type: cuboid, size: [1, 1, 0.4]}")
+    scenario = load_sources("mounted.yaml", {"mounted.yaml": text.encode()})
+    result = run_case(CaseOrder(scenario, tmp_path, rrd=False), lambda done, total: None)
+    # the slab is from 0.3 to 0.7; the apexes go up at 6 cm/s for 10 s, `away` from 0.1 to the slab's very face
+    assert result.notes[1:] == (
+        "distance sensor 'away' is inside wall/slab in 66 of 301 frames; it reads the surface around it, from within",
+        "distance sensor 'off' is inside wall/slab in 250 of 301 frames; it reads the surface around it, from within",
     )

@@ -146,7 +146,7 @@ def test_models_come_by_name_or_from_a_file(tmp_path):
         "collision.pieces": "convex@1",
         "collision.clearance": "never",
         "distance": "thesis@2",
-        "capacitive": "midpoint@2",
+        "capacitive": "midpoint@3",
         "capacitive.splits": "4",
     }
     assert load_text(HEAD + "links: {a: {}}\nmodel: thesis2015\n").model == thesis

@@ -7,6 +7,7 @@ import pytest
 
 from replay.collision import pairs
 from replay.errors import ScenarioError
+from replay.geometry.primitives import cube
 from replay.kinematics.motion import sample
 from replay.scenario import scene as scene_module
 from replay.scenario.load import load, load_model, load_sources
@@ -138,7 +139,22 @@ def test_notes_on_meshes_name_the_file():
     first = wedge.index("facet")
     opened = wedge[:first] + wedge[wedge.index("facet", wedge.index("endfacet") + 8) :]
     scene = build_text("links: {a: {shapes: {s: {type: mesh, file: w.stl, scale: 1}}}}\n", w=opened.encode())
-    assert scene.notes == ("w.stl: not watertight: 3 edges are open; it has no inside, only a surface",)
+    assert len(scene.notes) == 1 and scene.notes[0].startswith("w.stl: not watertight: 3 edges are open; ")
+
+
+def test_convex_pieces_say_what_they_cost(tmp_path, monkeypatch):
+    # a hollow box: a part in its cavity read contact, and nothing said why
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    box = cube(1.0).triangles
+    rows = "".join(f"v {x} {y} {z}\n" for x, y, z in np.concatenate([box, 0.6 * box[:, ::-1]]).reshape(-1, 3))
+    rows += "".join(f"f {k} {k + 1} {k + 2}\n" for k in range(1, 73, 3))
+    text = "links: {a: {shapes: {s: {type: mesh, file: m.obj, scale: 1}}}, b: {shapes: {s: {type: cube, size: 0.1}}}}\n"
+    sources = {"f.yaml": (HEAD + text + "model: {collision: {pieces: convex}}\n").encode(), "m.obj": rows.encode()}
+    scene = build(load_sources("f.yaml", sources))
+    assert scene.notes == (
+        "a/s collides as 1 convex piece: +28 % of its volume, up to 0 m beyond its surface, up to 0 m of it missed, "
+        "a closed cavity filled",
+    )
 
 
 def test_a_model_replaces_the_scenarios_own(full):

@@ -20,6 +20,7 @@ from replay.sensing.capacitive.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import check_splits
+from replay.sensing.capacitive.plate_inside import plates_inside
 from replay.sensing.capacitive.sensor import CapacitiveSensor
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
@@ -51,6 +52,7 @@ class CapacitiveSuite:
     A corner that is in the plane of a plate or of one of its borders as far as poses are known, to 8 epsilon of the way
     from the plate over the links to it, is in it: a face flush with a plate does not lie before it, and a wall that a
     plate abuts on saturates it. As far as that, a face whose plane holds the centre of a plate does not face it.
+    A plate in a body that has an inside, or flush on one and facing into it, touches it and is saturated.
 
     Args:
         sensors: in the order of the columns.
@@ -130,7 +132,12 @@ class CapacitiveSuite:
                     distinct[links] = _distinct_poses(T, way) if self._savings else (T, way, np.arange(frames))
                 T_link_body, way, frame_of = distinct[links]
                 T_plate_body = transforms.compose(self._T_plate_link[s], T_link_body[:, None])
-                integral, touches = self._integrate(s, t, T_plate_body, way)
+                rounding = self._rounding(s, t, way)
+                integral, touches = self._integrate(s, t, T_plate_body, rounding)
+                if target.closing is not None:
+                    body = (target.triangles, target.tree, target.closing)
+                    inside = plates_inside(*body, T_plate_body, self._half_sizes[s], rounding)
+                    integral[inside], touches = np.inf, touches | inside
                 plates = len(sensor.plates)
                 self.counters.integrals += frames * plates
                 self.counters.triangles += frames * plates * len(target.triangles)
@@ -153,21 +160,22 @@ class CapacitiveSuite:
             touching=touching,
         )
 
-    def _integrate(
-        self, sensor_index: int, target_index: int, T_plate_body: Floats, way: Floats
-    ) -> tuple[Floats, Flags]:
-        """Return the integrals [m] and the touching flags, (n, plates), of one body for the plates of one sensor.
+    def _rounding(self, sensor_index: int, target_index: int, way: Floats) -> Floats:
+        """Return how far off places may be (n,) [m], of a way (n,) [m] between the links, see `LinkPoses.way`."""
+        size = float(np.max(np.abs(self.targets[target_index].triangles)))
+        steps = max(float(np.abs(plate.T_link_plate[:3, 3]).sum()) for plate in self.sensors[sensor_index].plates)
+        return POSE_ROUNDING * (way + steps + size)
 
-        `way` (n,) [m] is how long the way between their links is, see `LinkPoses.way`.
-        """
+    def _integrate(
+        self, sensor_index: int, target_index: int, T_plate_body: Floats, rounding: Floats
+    ) -> tuple[Floats, Flags]:
+        """Return the integrals [m] and the touching flags, (n, plates), of one body for the plates of one sensor."""
         sensor = self.sensors[sensor_index]
         both, facing = sensor.side == "both", sensor.faces == "facing"
         scale, clusters = self._scales[target_index], self._clusters[target_index]
         half_sizes, T = scale * self._half_sizes[sensor_index], T_plate_body.copy()
         T[..., :3, 3] *= scale
-        size = float(np.max(np.abs(self.targets[target_index].triangles)))
-        steps = max(float(np.abs(plate.T_link_plate[:3, 3]).sum()) for plate in sensor.plates)
-        rounding = scale * POSE_ROUNDING * (way + steps + size)
+        rounding = scale * rounding
         if clusters is not None:
             counts = np.zeros(COUNTS, dtype=np.int64)
             integral, touching, _ = sum_tree(clusters, T, rounding, half_sizes, both, facing, self.rtol, counts)

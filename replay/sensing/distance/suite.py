@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.errors import InvalidValue
+from replay.errors import InvalidValue, count
 from replay.geometry import surface_boxes, tree, wide_tree
+from replay.geometry.containment import each_inside
 from replay.geometry.tree import triangle_tree
 from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
@@ -94,8 +95,9 @@ class DistanceSuite:
         savings: False looks at every triangle in every frame, and takes nothing from the frame before; the readings are
             the same bit for bit (tests/test_savings.py); of "rays", but where a ray all but lies in a triangle's plane.
 
-    An apex on a face of a target reads 0 with it, whichever way the sensor looks, as far as poses are known: to 8
-    epsilon of the way from the sensor over the links to the face (methods "exact", and "rays" with engine "own").
+    An apex inside a body reads the closest point of the body's surface in the cone all the same, from within; `notes`
+    says so. An apex on a face of a target reads 0 with it, whichever way the sensor looks, as far as poses are known:
+    to 8 epsilon of the way from the sensor over the links to the face (methods "exact", and "rays" with engine "own").
 
     Attributes:
         counters: what was done so far.
@@ -129,6 +131,7 @@ class DistanceSuite:
         self._savings = savings
         self.counters = DistanceCounters()
         self._sweep = self._sweeper(engine)
+        self._frames, self._inside = 0, np.zeros((len(self.sensors), len(self.targets)), dtype=np.int64)
 
     def run(self, poses: LinkPoses) -> DistanceColumns:
         """Return the readings of all sensors in all frames of a block.
@@ -164,7 +167,25 @@ class DistanceSuite:
                     part = slice(frame, frame + 1)
                     self._sweep(sensor, index, T_target_sensor[index][part], rounding[part], nearest.of(part))
             write_sensor(columns, column, nearest, self.targets, T_target_sensor, poses, sensor.min_range)
+            self._count_inside(column, nearest, T_target_sensor)
+        self._frames += frames
         return columns
+
+    def notes(self) -> tuple[str, ...]:
+        """Return a line for each sensor and each body that its apex was inside of, on no face, in frames so far."""
+        return tuple(
+            f"distance sensor {self.sensors[s].name!r} is inside {self.targets[t].name} in {self._inside[s, t]} of "
+            f"{count(self._frames, 'frame')}; it reads the surface around it, from within"
+            for s, t in np.argwhere(self._inside).tolist()
+        )
+
+    def _count_inside(self, column: int, nearest: Nearest, T_target_sensor: dict[int, Array]) -> None:
+        for index, pose in T_target_sensor.items():
+            target = self.targets[index]
+            if target.closing is not None:
+                apex = np.ascontiguousarray(pose[:, :3, 3])
+                held = each_inside(apex, target.triangles, target.tree, target.closing)
+                self._inside[column, index] += np.count_nonzero(held & (nearest.distance > 0.0))
 
     def _sweeper(self, engine: str) -> Sweep:
         if self.method == "exact":

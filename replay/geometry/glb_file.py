@@ -1,4 +1,4 @@
-"""Whether a GLB file is whole, and whether all of its triangles would be read, told before they are."""
+"""GLB files without their pictures, once it is known that they are whole and all of their triangles would be read."""
 
 from __future__ import annotations
 
@@ -13,27 +13,56 @@ _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
 """Extensions that change what a body looks like and not where it is."""
 _FAN = 6
+_LOOKS = ("images", "textures", "materials", "samplers", "skins", "animations", "cameras")
+"""Entries that say what a scene looks like, or how it moves."""
 
 
-def check(data: bytes) -> int:
-    """Return 0: how many triangles there are is known only when the scene has been put together.
+def bare(data: bytes) -> bytes:
+    """Return a GLB file with no more in it than bodies in their places: no pictures, materials, skins or motion.
+
+    A picture of a few hundred kB can unfold to gigabytes, and what something looks like has no part in its shape.
 
     Raises:
         ValueError: the file is cut or not glTF 2, or its geometry is kept in a way that would not be read.
     """
     scene, binary = _chunks(data)
+    size = len(binary)
     try:
         _check_extensions(scene)
-        _check_buffers(scene, binary)
+        _check_buffers(scene, size)
         _check_geometry(scene)
         _check_nodes(scene)
-    except (KeyError, TypeError, IndexError, AttributeError) as error:
-        raise ValueError(f"its description is not glTF 2 ({type(error).__name__}: {error})") from None
-    return 0
+        _strip(scene)
+    except KeyError as error:
+        raise ValueError(f"its description is not glTF 2: it lacks the entry {str(error.args[0])[:40]}") from None
+    except OverflowError:
+        raise ValueError("a number in its description is too large") from None
+    except IndexError:
+        raise ValueError("its description is not glTF 2: it refers to an entry that is not there") from None
+    except (TypeError, AttributeError):
+        raise ValueError("its description is not glTF 2: an entry is of another kind than it should be") from None
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    rest = struct.pack("<2I", size, _BINARY) + binary if size else b""
+    return b"glTF" + struct.pack("<4I", 2, 20 + len(text) + len(rest), len(text), _JSON) + text + rest
 
 
-def _chunks(data: bytes) -> tuple[dict[str, Any], int]:
-    """Return the description of the scene, and how many bytes of binary data come with it."""
+def _strip(scene: dict[str, Any]) -> None:
+    for name in _LOOKS:
+        scene.pop(name, None)
+    for mesh in scene.get("meshes", ()):
+        mesh.pop("name", None)
+        for primitive in mesh["primitives"]:
+            for name in ("material", "targets", "extensions"):
+                primitive.pop(name, None)
+            primitive["attributes"] = {"POSITION": primitive["attributes"]["POSITION"]}
+    for node in scene.get("nodes", ()):
+        for name in ("skin", "camera", "weights", "name", "extras"):
+            node.pop(name, None)
+
+
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the description of the scene, and the binary data that come with it."""
     if data[:4] != b"glTF" or len(data) < 20:
         raise ValueError("it does not begin as one")
     version, length, size, kind = struct.unpack("<4I", data[4:20])
@@ -55,9 +84,9 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], int]:
         if 8 + size > len(rest):
             raise ValueError(f"a part of it announces {size} bytes; {len(rest) - 8} follow")
         if kind == _BINARY:
-            return scene, size
+            return scene, rest[8 : 8 + size]
         rest = rest[8 + size :]
-    return scene, 0
+    return scene, b""
 
 
 def _check_extensions(scene: dict[str, Any]) -> None:
@@ -78,7 +107,10 @@ def _check_buffers(scene: dict[str, Any], binary: int) -> None:
         if view["byteLength"] < 0 or (inside and view.get("byteOffset", 0) + view["byteLength"] > binary):
             raise ValueError(f"buffer view {number} is beyond the {binary} bytes of its data")
     for number, accessor in enumerate(scene.get("accessors", ())):
-        row = _COMPONENT_BYTES[accessor["componentType"]] * _COMPONENTS[accessor["type"]]
+        kind, shape = accessor["componentType"], accessor["type"]
+        if kind not in _COMPONENT_BYTES or shape not in _COMPONENTS:
+            raise ValueError(f"accessor {number} is of a type that glTF does not know")
+        row = _COMPONENT_BYTES[kind] * _COMPONENTS[shape]
         if "bufferView" in accessor:
             view = views[accessor["bufferView"]]
             stride = view.get("byteStride", row)

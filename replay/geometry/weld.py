@@ -1,0 +1,136 @@
+"""Corners that an exporter's rounding has parted: which of them are one."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.geometry.winding import Indices, sides
+
+Array = NDArray[np.float64]
+
+TOLERANCES: Final = (1e-12, 1e-9, 1e-6)
+"""How far apart corners that are taken for one may be, as shares of the body's largest extent, tried in this order.
+
+The rounding of doubles, what is left of it after a few products, and that of single precision or six written digits.
+"""
+
+_CROWD = 50  # of neighbours a corner has on average: so many are a shape of its own
+_ROUNDING = TOLERANCES[0]
+
+
+def weld(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indices:
+    """Return the corner that each corner (p,) is taken for, itself for most.
+
+    Only corners at the ends of open edges are looked at, and they become one only where that closes an edge. No
+    triangle that has an area loses it, and, beyond the rounding of doubles, no two triangles become the same: a thin
+    wall stays two walls.
+
+    Args:
+        points: (p, 3) [m].
+        faces: (n, 3) indices of them.
+        flat: (n,) which faces have no area.
+    """
+    from scipy.spatial import cKDTree
+
+    taken_for = np.arange(len(points))
+    extent = float(np.max(np.ptp(points, axis=0)))
+    for tolerance in TOLERANCES:
+        found = sides(taken_for[faces])
+        ends = np.unique(found.ends[found.number % 2 == 1])
+        if len(ends) < 2:
+            break
+        reach = tolerance * extent
+        tree = cKDTree(points[ends])
+        if tree.count_neighbors(tree, reach) > _CROWD * len(ends):
+            continue
+        pairs = ends[tree.query_pairs(reach, output_type="ndarray")]
+        if len(pairs):
+            taken_for = _welded(points, faces, flat, taken_for, pairs, reach, tolerance)
+    return taken_for
+
+
+def _welded(
+    points: Array,
+    faces: Indices,
+    flat: NDArray[np.bool_],
+    taken_for: Indices,
+    pairs: Indices,
+    reach: float,
+    tolerance: float,
+) -> Indices:
+    """Return `taken_for` with those groups of near corners that may become one and close an edge by it."""
+    now = taken_for[faces]
+    group = _groups(len(points), pairs)
+    size = np.bincount(group)
+    allowed = size > 1
+    low, high = np.full((len(size), 3), np.inf), np.full((len(size), 3), -np.inf)
+    np.minimum.at(low, group, points)
+    np.maximum.at(high, group, points)
+    allowed &= np.max(high - low, axis=1) <= reach
+    # a triangle of some area must not lose it
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        same = (group[now[:, a]] == group[now[:, b]]) & (now[:, a] != now[:, b]) & ~flat
+        allowed[group[now[same, a]]] = False
+    used = np.bincount(now.ravel(), minlength=len(points))
+    while True:
+        trial = _merged(group, allowed, used)[taken_for]
+        then = trial[faces]
+        if tolerance > _ROUNDING:  # walls that would become one
+            clash = _made_alike(now[~flat], then[~flat])
+            moved = now[~flat][clash] != then[~flat][clash]
+            worse = np.unique(group[now[~flat][clash][moved]])
+            if len(worse):
+                worse = np.concatenate([worse, np.unique(group[now[~flat][clash].ravel()])])
+                allowed[worse] = False
+                continue
+        useful = np.zeros(len(allowed), dtype=np.bool_)
+        useful[group[_ends_of_closed_edges(now, then)]] = True
+        if not (allowed & ~useful).any():
+            return trial
+        allowed &= useful
+
+
+def _groups(count: int, pairs: Indices) -> Indices:
+    """Return the number of the group (count,) of each corner, near ones in one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _merged(group: Indices, allowed: NDArray[np.bool_], used: Indices) -> Indices:
+    """Return the corner that each one is taken for when the allowed groups are one: the one used most, the first."""
+    order = np.lexsort([np.arange(len(group)), -used, group])
+    heads = np.empty(len(allowed), dtype=np.int64)
+    first = np.flatnonzero(np.diff(group[order], prepend=-1))
+    heads[group[order[first]]] = order[first]
+    return np.where(allowed[group], heads[group], np.arange(len(group)))
+
+
+def _made_alike(now: Indices, then: Indices) -> NDArray[np.bool_]:
+    """Return which faces (n,) have the corners of another one then, but not now."""
+
+    def kinds(faces: Indices) -> Indices:
+        return np.asarray(np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)[1]).ravel()
+
+    before, after = kinds(now), kinds(then)
+    pairs = np.unique(np.stack([after, before], axis=1), axis=0)
+    several = np.bincount(pairs[:, 0], minlength=int(after.max(initial=0)) + 1) > 1
+    return np.asarray(several[after])
+
+
+def _ends_of_closed_edges(now: Indices, then: Indices) -> Indices:
+    """Return the corners, as they are now, at the ends of open edges that are not open then."""
+    before = sides(now)
+    odd = before.ends[before.number % 2 == 1]
+    after = sides(then)
+    open_then = {tuple(pair) for pair in after.ends[after.number % 2 == 1].tolist()}
+    name = np.arange(int(max(now.max(initial=0), then.max(initial=0))) + 1)
+    name[now.ravel()] = then.ravel()
+    renamed = np.sort(name[odd], axis=1)
+    closed = [tuple(pair) not in open_then for pair in renamed.tolist()]
+    return np.unique(odd[np.array(closed, dtype=np.bool_)])
