@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from replay.geometry.winding import Indices, sides
 from replay.numerics.rows import distinct_rows
 
-
 _MOST_TOGETHER = 200  # walls that close something only together
 
 
