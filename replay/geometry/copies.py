@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.geometry.winding import Indices, sides
 from replay.numerics.rows import distinct_rows
+
+_MOST_TOGETHER = 200  # walls that close something only together
 
 
 def copies(faces: Indices) -> NDArray[np.bool_]:
@@ -14,7 +18,8 @@ def copies(faces: Indices) -> NDArray[np.bool_]:
 
     Needed are the faces that closed bodies share: where two bodies meet in a wall that each of them has, one wall less
     leaves three triangles at each edge around it, and the second one makes them four. Copies are taken wall by wall,
-    the smallest first; a sheet's two sides, or a body that is there twice, close nothing that way.
+    the smallest first, then walls that meet together; a sheet's two sides, or a body that is there twice, close nothing
+    that way.
     """
     kind = distinct_rows(np.sort(faces, axis=1)).kind
     order = np.argsort(kind, kind="stable")
@@ -28,14 +33,64 @@ def copies(faces: Indices) -> NDArray[np.bool_]:
     kept = sides(faces[~result])
     edges, count = kept.ends[:, 0] * width + kept.ends[:, 1], kept.number  # those of copies are among them
     for layer in range(1, int(rank.max()) + 1):
+        left: list[_Wall] = []
         for wall in _walls(faces, np.flatnonzero(rank == layer), edges, count):
-            rim = sides(faces[wall])
-            at = np.searchsorted(edges, rim.ends[:, 0] * width + rim.ends[:, 1])
-            odd = at[rim.number % 2 == 1]
-            if len(odd) and ((count[odd] >= 3) & (count[odd] % 2 == 1)).all():
-                result[wall] = False
-                count[at] += rim.number
+            around = sides(faces[wall])
+            at = np.searchsorted(edges, around.ends[:, 0] * width + around.ends[:, 1])
+            left.append(_Wall(wall, at, around.number))
+        for needed in _needed(left, count):
+            result[needed.faces] = False
     return result
+
+
+class _Wall(NamedTuple):
+    """A wall: its faces, the edges at them, and how many of its faces each of these has."""
+
+    faces: Indices
+    edges: Indices
+    number: Indices
+
+    @property
+    def rim(self) -> Indices:
+        return np.asarray(self.edges[self.number % 2 == 1])
+
+
+def _needed(walls: list[_Wall], count: Indices) -> list[_Wall]:
+    """Return the walls that close what is open without them, alone or several that meet, and add them to `count`.
+
+    Args:
+        walls: smallest first.
+        count: (e,) faces that are kept at each edge.
+    """
+    found: list[_Wall] = []
+    waiting = [wall for wall in walls if len(wall.rim) and (count[wall.rim] >= 3).all()]
+    for wall in list(waiting):
+        if (count[wall.rim] % 2 == 1).all():
+            count[wall.edges] += wall.number
+            found.append(wall)
+            waiting = [other for other in waiting if other is not wall]
+    # where several walls meet at an edge it takes all of them
+    while waiting:
+        group = [waiting.pop(0)]
+        touched = set(group[0].rim.tolist())
+        closed = False
+        grown = True
+        while grown and not closed and len(group) < _MOST_TOGETHER:
+            rims = np.concatenate([wall.rim for wall in group])
+            at, more = np.unique(rims, return_counts=True)
+            closed = bool(((count[at] + more) % 2 == 0).all() and (count[at] % 2 == 1).any())
+            grown = False
+            for k, other in enumerate(waiting):
+                if not closed and not touched.isdisjoint(other.rim.tolist()):
+                    group.append(waiting.pop(k))
+                    touched |= set(other.rim.tolist())
+                    grown = True
+                    break
+        if closed:
+            for wall in group:
+                count[wall.edges] += wall.number
+            found += group
+    return found
 
 
 def _walls(faces: Indices, extra: Indices, edges: Indices, count: Indices) -> list[Indices]:

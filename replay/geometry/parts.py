@@ -1,8 +1,9 @@
 """The parts of a surface: which triangles hang together, and how they are turned so that each is wound one way.
 
 Across an edge of two triangles these are neighbours. Where more meet, bodies touch or walls branch off: first each
-part's own two are neighbours, then the others are paired, those that bound the thinnest wedge first, but no two that
-lie on each other while there are others. So two bodies that share an edge or a wall stay two parts.
+part's own two are neighbours, then the others are paired, those that are wound one way and bound the thinnest wedge
+first, but no two that lie on each other while there are others. So two bodies that share an edge or a wall stay two
+parts.
 """
 
 from __future__ import annotations
@@ -52,6 +53,8 @@ def find_parts(points: Array, faces: Indices) -> Parts:
         pairs = np.concatenate([pairs, np.array(more, dtype=np.int64).reshape(-1, 3)])
     label = _components(len(faces), pairs)
     turned, one_sided = _against(label, pairs)
+    if turned.any():  # where several meet, neighbours are a guess: what is closed as it is wound stays
+        turned &= ~_closed(faces, label, np.zeros_like(turned))[label]
     return Parts(label, turned, _closed(faces, label, turned), one_sided)
 
 
@@ -119,11 +122,14 @@ def _pair_up(points: Array, faces: Indices, found: Sides, edge: int, joined: _Jo
             left.extend(same)
     angle = dict(zip(left, _angles(points, faces, found, edge, left), strict=True))
 
-    def cost(pair: tuple[int, int]) -> tuple[bool, float, bool, int]:
+    balanced = 2 * sum(bool(found.forward[k]) for k in left) == len(left)
+
+    def cost(pair: tuple[int, int]) -> tuple[bool, bool, float, bool, int]:
         a, b = pair
         between = abs(angle[a] - angle[b])
         between = min(between, 2.0 * math.pi - between)
-        return between < _NO_WEDGE, round(between, 9), bool(found.forward[a] == found.forward[b]), abs(a - b)
+        same_way = bool(found.forward[a] == found.forward[b])
+        return between < _NO_WEDGE, balanced and same_way, round(between, 9), same_way, abs(a - b)
 
     for a, b in sorted(itertools.combinations(left, 2), key=cost):
         if a in angle and b in angle:

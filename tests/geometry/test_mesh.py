@@ -362,3 +362,16 @@ def test_random_damage_never_escapes() -> None:
                 load_mesh(f"body.{ending}", scale=1.0, data=bytes(data))
             except MeshError as error:
                 assert "\n" not in str(error)
+
+
+def test_what_is_closed_as_it_is_wound_stays() -> None:
+    """Where four triangles meet at many edges, which are neighbours is a guess, and no reason to turn any."""
+    unit = primitives.cube(1.0).triangles
+    rng = np.random.default_rng(9)
+    for _ in range(20):  # cubes of a grid, touching in corners, edges and walls
+        cells = rng.permutation(np.array(list(np.ndindex(3, 3, 3))))[: rng.integers(4, 20)]
+        whole = np.concatenate([unit + cell for cell in cells])
+        for mesh in (whole, whole[rng.permutation(len(whole))]):
+            solid = solid_from_triangles(mesh)
+            assert solid.watertight and solid.notes == () and solid.volume == pytest.approx(len(cells))
+            assert contains(solid.triangles, cells + 0.01).all()
