@@ -52,9 +52,9 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
     model = needs.model
     found: tuple[Any, ...] = ()
     if needs.meshes:
-        from replay.geometry import mesh, tree
+        from replay.geometry import closing, containment, mesh, tree
 
-        found += entries_of(tree, mesh)
+        found += entries_of(tree, mesh, closing, containment)
     if needs.collision:
         from replay.collision import pipeline
 

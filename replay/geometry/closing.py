@@ -16,11 +16,12 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from replay.geometry.solid_angle import winding_number
 from replay.geometry.winding import corner_indices, sides
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,7 @@ def openness(triangles: Array, closing: Array) -> Openness:
     return Openness(float(off.mean()), float(off.max()))
 
 
+@entry(float64[:, ::1], float64[:, :, ::1])
 @kernel
 def _shares(points: Array, closing: Array) -> Array:
     result = np.empty(len(points))

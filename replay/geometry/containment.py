@@ -19,14 +19,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.closest import distance_to_surface
 from replay.geometry.closing import caps, openness
 from replay.geometry.solid_angle import winding_number
-from replay.geometry.tree import MAX_DEPTH, Tree, triangle_tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, triangle_tree
+from replay.numerics.jit import entry, kernel
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,7 @@ def contains(
     return each_inside(points, triangles, tree, np.ascontiguousarray(closing))
 
 
+@entry(float64[:, ::1], float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1])
 @kernel
 def each_inside(points: Array, triangles: Array, tree: Tree, closing: Array) -> NDArray[np.bool_]:
     """Return which points (m, 3) are inside, see `inside`."""

@@ -11,11 +11,12 @@ not hold them, and one that its front lies flush on does.
 from __future__ import annotations
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
 from replay.geometry.containment import inside
-from replay.geometry.tree import Tree
-from replay.numerics.jit import kernel
+from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.jit import entry, kernel
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -27,6 +28,7 @@ _BEFORE = 16.0
 """How far before the plate, in what rounding takes for touching."""
 
 
+@entry(float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], float64[::1])
 @kernel
 def plates_inside(
     triangles: Floats, tree: Tree, closing: Floats, T_plate_body: Floats, half_sizes: Floats, rounding: Floats

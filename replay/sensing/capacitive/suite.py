@@ -40,7 +40,7 @@ SMALLEST_RTOL = 1e-12
 def kernels(*, method: str, savings: bool = True) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `CapacitiveSuite`."""
     own = (*entries_of(clusters), sum_tree) if method == "tree" and savings else (sum_triangles,)
-    return (*entries_of(tree), triangle_areas, *own)
+    return (*entries_of(tree), triangle_areas, plates_inside, *own)
 
 
 class CapacitiveSuite:

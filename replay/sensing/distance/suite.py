@@ -39,11 +39,12 @@ ENGINES = ("own", "embree")
 
 def kernels(*, method: str, engine: str, savings: bool = True) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `DistanceSuite`."""
+    used = (*entries_of(tree), each_inside)
     if method == "exact":
-        return (*entries_of(tree, surface_boxes, wide_tree), sweep_exact if savings else sweep_scan)
+        return (*used, *entries_of(surface_boxes, wide_tree), sweep_exact if savings else sweep_scan)
     if method == "thesis":
-        return (*entries_of(tree), sweep_thesis)
-    return (*entries_of(tree), *((sweep_rays,) if engine == "own" else ()))
+        return (*used, sweep_thesis)
+    return (*used, *((sweep_rays,) if engine == "own" else ()))
 
 
 @dataclass(frozen=True, eq=False)
