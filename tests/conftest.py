@@ -1,11 +1,14 @@
-"""The same examples on every run of `make test`; `make soak` looks for new ones."""
+"""The same examples on every run of `make test`; `make soak` looks for new ones. Compiling kernels is not told."""
 
 import pytest
 from hypothesis import settings
+
+from replay.numerics.jit import progress
 
 settings.register_profile("seeded", derandomize=True, deadline=None)
 settings.register_profile("soak", deadline=None, print_blob=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    progress.tell_by(lambda state: None, lambda text: None)  # else it would be in what tests read on stderr
     settings.load_profile("soak" if config.option.markexpr == "soak" else "seeded")

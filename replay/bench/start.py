@@ -27,12 +27,13 @@ sys.exit(code)
 TABLE = "start of commands, fresh processes"
 
 
-def run(*, quick: bool = False, rounds: int | None = None) -> Report:
+def run(*, quick: bool = False, rounds: int | None = None, first_runs: bool = True) -> Report:
     """Run the benchmark.
 
     Args:
         quick: fewer rounds, and of the first run two scenes; about a minute.
         rounds: 7, or 3 when quick, if None.
+        first_runs: whether to run scenarios on an empty folder of kernels too, which takes minutes.
     """
     report = Report("start")
     with resources.as_file(resources.files("replay.bench").joinpath("pipeline.yaml")) as path:
@@ -64,7 +65,8 @@ def run(*, quick: bool = False, rounds: int | None = None) -> Report:
     report.goals.append(
         Goal("start.modules", float(len({*loaded["replay validate"], *loaded["replay --help"]} & {*PROMISED})))
     )
-    cold.measure(report, quick=quick)
+    if first_runs:
+        cold.measure(report, quick=quick)
     return report
 
 

@@ -5,6 +5,7 @@ Nothing is said of what takes moments, and nothing where nothing is compiled.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import threading
 import time
@@ -90,13 +91,13 @@ class OnStderr:
 
     def __call__(self, state: Compiling) -> None:
         """Show how far it is."""
-        terminal = sys.stderr.isatty()
         now = time.monotonic()
-        if terminal:
-            print(f"\r\x1b[Kreplay: {state}", end="\n" if state.ended else "", file=sys.stderr, flush=True)
-        elif state.ended or now >= self._next:
-            self._next = now + _LINES
-            print(f"replay: {state}", file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed meanwhile, or none at all
+            if sys.stderr.isatty():
+                print(f"\r\x1b[Kreplay: {state}", end="\n" if state.ended else "", file=sys.stderr, flush=True)
+            elif state.ended or now >= self._next:
+                self._next = now + _LINES
+                print(f"replay: {state}", file=sys.stderr, flush=True)
 
 
 _said: set[str] = set()

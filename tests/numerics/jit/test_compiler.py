@@ -59,7 +59,9 @@ def test_what_a_kernel_calls_is_lowered_and_only_what_python_calls_is_compiled()
     assert list(_square.overloads) == [(float64,)]
 
 
-def test_constants_among_arguments_make_no_specialisations():
+def test_constants_among_arguments_make_no_specialisations(tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.numerics.jit.store.directory", lambda: tmp_path)  # nothing is there already
+
     @leaf_kernel
     def power(x, n):
         result = 1.0
