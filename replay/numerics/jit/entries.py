@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from numba import types
 
-from replay.numerics.jit import progress, store
+from replay.numerics.jit import compiler, progress, store
 from replay.numerics.jit.reach import key_of, name_of, reached
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -77,10 +77,11 @@ def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: 
 
     Args:
         kernels: decorated by `entry`; without a compiler (NUMBA_DISABLE_JIT) there is nothing to do.
-        share: called when more than one is not compiled yet, so that other processes can be asked to do the same.
+        share: called when more than one is not compiled yet, so that other processes can be asked to do the same; not
+            where numba keeps kernels itself (`compiler.AVAILABLE`), since nobody knows what it has.
     """
     entries = [_Entry(kernel) for kernel in dict.fromkeys(kernels) if hasattr(kernel, "compile")]
-    missing = [entry for entry in entries if not entry.is_ready]
+    missing = [entry for entry in entries if compiler.AVAILABLE and not entry.is_ready]
     if missing:
         missing.sort(key=lambda entry: -entry.size)
         if len(missing) > 1:

@@ -32,6 +32,10 @@ def test_with_another_numba_kernels_are_compiled_by_its_public_decorator(package
     assert list(package.cache.rglob("*.nbc"))  # numba's own cache, in a folder named by all sources
     hits = "print(outer(1.0), sum(outer.stats.cache_hits.values()))"
     assert package.run(hits) == "20.0 1"
+    ahead = "import numba; from replay.numerics.jit import compile_entries\n"
+    ahead += "for each in (outer, alone): each.declared = (numba.float64,)\n"
+    ahead += "compile_entries([outer, alone], share=lambda: print('shared')); print(len(outer.overloads))"
+    assert package.run(ahead) == "1"
     callee = (package.root / "geometry" / "callee.py").read_text()
     package.write("geometry/callee.py", callee.replace("1.0", "2.0"))
     assert package.run(hits) == "30.0 0"
