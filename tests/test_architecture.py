@@ -12,6 +12,7 @@ import replay
 PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
+    "lfs_pointer",
     "numerics",
     "geometry",
     "logs",

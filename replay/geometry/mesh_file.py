@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from replay.errors import MeshError
 from replay.geometry import glb_file, obj_file, ply_file, stl_check
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 FORMATS: Final = (".stl", ".obj", ".ply", ".glb")
 """File endings that can be read; upper case too."""
 
 _ADVICE = "; open it in a mesh editor and save it again as triangles"
-_POINTER = b"version https://git-lfs.github.com/spec/"
 _UTF_8, _UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 """How texts may begin."""
 
@@ -45,8 +45,8 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
             raise MeshError(name, error.strerror or "cannot be read") from error
     if not data:
         raise MeshError(name, "is empty")
-    if data.startswith(_POINTER):
-        raise MeshError(name, "is a Git LFS pointer, not the mesh itself; fetch it with: git lfs pull")
+    if is_lfs_pointer(data):
+        raise MeshError(name, LFS_POINTER)
     data = data.removeprefix(_UTF_8)
     if _is_utf_16(data):
         raise MeshError(name, "is UTF-16 text; save it as UTF-8")

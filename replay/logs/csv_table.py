@@ -50,7 +50,7 @@ class Table:
         headings: by column; "" for none.
         time: heading of the times.
         lines: number of the line of each row.
-        rows: cells, as many as headings.
+        columns: the cells of all rows, by column.
         origin: the note on the file that this is a part of, else empty.
     """
 
@@ -81,10 +81,12 @@ class Table:
         if len(set(named)) != len(named):
             raise RecordingError(name, f"has a heading twice; its columns are {named}")
         self.lines: list[int] = []
-        self.rows: list[list[str]] = []
+        rows = []
         for line, cells in self._cells(lines):
             self.lines.append(line)
-            self.rows.append(self._fitted(line, cells))
+            rows.append(cells if len(cells) == len(self.headings) else self._fitted(line, cells))
+        columns = zip(*rows, strict=True) if rows else ((),) * len(self.headings)
+        self.columns = [tuple(map(str.strip, column)) for column in columns]
 
     def _headings(self, line: str, candidates: Sequence[str]) -> tuple[str, list[str], str] | None:
         """Return separator, headings and the heading of the times, where there is such a one."""
@@ -117,26 +119,19 @@ class Table:
         return f"{rule}; name the one with the times in time.column"
 
     def _cells(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-        numbers: list[int] = []
-
-        def counted() -> Iterator[str]:
-            for index in range(self.begin, len(lines)):
-                if not lines[index].lstrip().startswith(_COMMENT):
-                    numbers.append(index + 1)
-                    yield lines[index]
-
-        reader = csv.reader(counted(), delimiter=self.separator, strict=True)
+        numbers = [k for k in range(self.begin, len(lines)) if not lines[k].lstrip().startswith(_COMMENT)]
+        reader = csv.reader((lines[k] for k in numbers), delimiter=self.separator, strict=True)
         try:
             for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    yield numbers[-1], cells
+                if any(map(str.strip, cells)):
+                    yield numbers[reader.line_num - 1] + 1, cells
         except csv.Error as error:
             raise RecordingError(self._name, f"cannot be read as CSV: {error}") from None
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """Return a line's cells, as many as headings: what is missing or more than those must be empty."""
         count = len(self.headings)
-        row = [cell.strip() for cell in cells[:count]] + [""] * (count - len(cells))
+        row = cells[:count] + [""] * (count - len(cells))
         if any(cell.strip() for cell in cells[count:]) or any(self.headings[len(cells) :]):
             rule = f"line {line} has {len(cells)} cells, its headings are {count}"
             if self.separator == "," and len(cells) > count and all(_digits(cell) for cell in cells):

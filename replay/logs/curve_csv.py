@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import CurveError
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 Floats = NDArray[np.float64]
 

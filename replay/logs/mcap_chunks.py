@@ -57,7 +57,7 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
                 reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
                 data = reader.read(size + 1)
         elif chunk.compression == "lz4":
-            data = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+            data = _of_lz4(packed, size)
         elif chunk.compression == "":
             data = packed
         else:
@@ -68,6 +68,16 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
         raise _damage(file, chunk, "does not unpack to the size it claims")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise _damage(file, chunk, "has a wrong checksum")
+    return data
+
+
+def _of_lz4(packed: bytes, size: int) -> bytes:
+    """Return what lz4 frames, one after another, unpack to; no more than about `size` bytes."""
+    data = b""
+    while packed and len(data) < size:
+        frame = lz4.frame.LZ4FrameDecompressor()
+        data += frame.decompress(packed, max_length=size + 1 - len(data))
+        packed = frame.unused_data or b""  # None where a frame is not at its end
     return data
 
 

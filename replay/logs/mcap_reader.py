@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from replay.errors import RecordingError
-from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.logs.loss import Loss
 from replay.logs.mcap_chunks import MESSAGE_ROW, Run, mixed_runs, regular_run, unpack
 from replay.logs.mcap_records import (

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from replay.errors import RecordingError
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Chunk, Op

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from replay.errors import ViewerError
-from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.recording.picture import end, viewer_binary
 
 

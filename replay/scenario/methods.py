@@ -18,7 +18,7 @@ METHOD_REVISIONS: Final = {
     "collision.bounds.sphere": 1,
     "collision.narrowphase.gjk": 1,
     "collision.narrowphase.fcl": 1,
-    "collision.pieces.exact": 2,
+    "collision.pieces.exact": 3,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
     "distance.exact": 3,

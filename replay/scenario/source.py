@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from replay.errors import Problem
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.scenario.node import Node, Place
 
 if TYPE_CHECKING:
