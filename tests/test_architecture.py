@@ -12,6 +12,8 @@ import replay
 PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
+    "limits",
+    "json_text",
     "numerics",
     "geometry",
     "logs",

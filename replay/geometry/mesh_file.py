@@ -10,12 +10,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.errors import MeshError
 from replay.geometry import glb_file, obj_file, ply_file, stl_check
 
 FORMATS: Final = (".stl", ".obj", ".ply", ".glb")
 """File endings that can be read; upper case too."""
 
+_HEAD = 1 << 16  # bytes among which a binary file has a zero
 _ADVICE = "; open it in a mesh editor and save it again as triangles"
 _POINTER = b"version https://git-lfs.github.com/spec/"
 _UTF_8, _UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
@@ -45,6 +47,10 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
             raise MeshError(name, error.strerror or "cannot be read") from error
     if not data:
         raise MeshError(name, "is empty")
+    if len(data) > limits.FILE:
+        raise MeshError(name, f"has {len(data)} bytes; at most {limits.FILE} are read")
+    if len(data) > limits.TEXT_MESH and b"\0" not in data[:_HEAD]:
+        raise MeshError(name, f"is text of {len(data)} bytes; at most {limits.TEXT_MESH} are read")
     if data.startswith(_POINTER):
         raise MeshError(name, "is a Git LFS pointer, not the mesh itself; fetch it with: git lfs pull")
     data = data.removeprefix(_UTF_8)
