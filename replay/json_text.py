@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from replay import limits
+
+_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 
 Value = TypeVar("Value")
 
@@ -29,7 +32,12 @@ def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES) -> Any:
     if groups > limits.JSON_GROUPS:
         raise ValueError(f"it has {groups} lists and objects; at most {limits.JSON_GROUPS} are read")
     try:
-        return json.loads(text)
+        value = json.loads(text)
+        if _SURROGATE.search(data):
+            json.dumps(value, ensure_ascii=False).encode()
+        return value
+    except UnicodeEncodeError:
+        raise ValueError("a text in it holds half of a surrogate pair, which is no character") from None
     except UnicodeDecodeError:
         raise ValueError("it is not UTF-8") from None
     except json.JSONDecodeError as error:

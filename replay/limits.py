@@ -80,6 +80,8 @@ NAMES: Final = 200_000
 """Names of links, joints, pairs and sensors in a recording's metadata."""
 CELLS: Final = 10_000_000
 """Cells of a table: of a CSV, JSON or Parquet log, or of an exported topic."""
+TEXT_LOG: Final = 256 * MIB
+"""Bytes of a log in CSV, or of a measured curve."""
 COLUMNS: Final = 10_000
 """Columns of a table."""
 
@@ -133,6 +135,16 @@ def visits(size: int) -> int:
 def records(size: int) -> int:
     """Return how many records a log of `size` bytes may have, messages among them: 2 million, or one a 16 bytes."""
     return max(2_000_000, size // 16)
+
+
+def reads(size: int) -> int:
+    """Return how many bytes of a bag of `size` bytes are read, those that are read again too: 64 MiB, or 4 times it."""
+    return max(64 * MIB, 4 * size)
+
+
+def database_steps(size: int) -> int:
+    """Return how many steps SQLite may take with a bag of `size` bytes: 100 million, or 10 a byte."""
+    return max(100_000_000, 10 * size)
 
 
 def passes(size: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -88,6 +89,8 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
 
     if b"\0" not in data:  # text, whose names and comments may be in any encoding
         data = data.decode(errors="replace").encode()
+    log = logging.getLogger("trimesh")  # it tells of its attempts with tracebacks
+    told, log.disabled = log.disabled, True
     try:
         with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks of the mesh
             warnings.simplefilter("ignore")
@@ -97,3 +100,5 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
         if not reason or type(error).__module__ == "builtins":  # Python's words are none for people
             reason = "what it holds does not fit together"
         raise MeshError(name, f"is not a usable {kind.upper()} file: {reason[:200]}{_ADVICE}") from error
+    finally:
+        log.disabled = told
