@@ -13,6 +13,8 @@ PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
     "lfs_pointer",
+    "limits",
+    "json_text",
     "numerics",
     "geometry",
     "logs",

@@ -24,8 +24,9 @@ from replay.batch.case import CaseOrder, CaseResult, Status, describe, run_case
 from replay.batch.cost import expected_cost
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.prepare import PrepareKernels, needs_of
-from replay.batch.resume import RESULT, earlier_result
+from replay.batch.resume import earlier_result
 from replay.batch.watch import Unwatched, Watch
+from replay.batch.written import RESULT
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError
 from replay.logs.part_file import append_lines, write_file
 from replay.scenario.methods import Model

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.excerpt import EXCERPT
 
@@ -56,6 +57,10 @@ class Table:
 
     def __init__(self, name: str, data: bytes, format: Format) -> None:
         """Read a file; RecordingError as of `read_csv`."""
+        if len(data) > limits.TEXT_LOG:
+            raise RecordingError(name, f"has {len(data)} bytes; at most {limits.TEXT_LOG} of a CSV are read")
+        if data.count(b"\n") + data.count(b"\r") > limits.CELLS:
+            raise RecordingError(name, f"has more than {limits.CELLS} lines")
         text = _text(name, data)
         self._name = name
         self._format = format
@@ -79,7 +84,10 @@ class Table:
         self.separator, self.headings, self.time = chosen
         named = [heading for heading in self.headings if heading]
         if len(set(named)) != len(named):
-            raise RecordingError(name, f"has a heading twice; its columns are {named}")
+            raise RecordingError(name, f"has a heading twice; its columns are {_some(named)}")
+        if len(lines) * len(self.headings) > limits.CELLS:
+            rule = f"has {len(lines)} lines of {len(self.headings)} columns; at most {limits.CELLS} cells are read"
+            raise RecordingError(name, rule)
         self.lines: list[int] = []
         rows = []
         for line, cells in self._cells(lines):
@@ -91,11 +99,21 @@ class Table:
     def _headings(self, line: str, candidates: Sequence[str]) -> tuple[str, list[str], str] | None:
         """Return separator, headings and the heading of the times, where there is such a one."""
         for separator in candidates:
-            headings = [heading.strip() for heading in next(csv.reader([line], delimiter=separator), [])]
+            headings = [heading.strip() for heading in self._split(line, separator)]
+            while headings and not headings[-1]:  # columns without a heading are passed over
+                del headings[-1]
+            if len(headings) > limits.COLUMNS:
+                raise RecordingError(self._name, f"has {len(headings)} columns; at most {limits.COLUMNS} are read")
             time = self._time_among(headings)
             if time is not None:
                 return separator, headings, time
         return None
+
+    def _split(self, line: str, separator: str) -> list[str]:
+        try:
+            return next(csv.reader([line], delimiter=separator), [])
+        except csv.Error as error:
+            raise RecordingError(self._name, f"cannot be read as CSV: {error}") from None
 
     def _time_among(self, headings: Sequence[str]) -> str | None:
         wanted = self._format.time or "time"
@@ -105,10 +123,10 @@ class Table:
         return units[0] if self._format.time is None and len(units) == 1 else None
 
     def _without_time(self, line: str, candidates: Sequence[str]) -> str:
-        by_separator = {s: next(csv.reader([line], delimiter=s), []) for s in candidates}
+        by_separator = {s: self._split(line, s) for s in candidates}
         separator = max(candidates, key=lambda s: len(by_separator[s]))
         headings = [heading.strip() for heading in by_separator[separator]]
-        rule = f"has no column {self._format.time or 'time'!r}; its columns are {headings}"
+        rule = f"has no column {self._format.time or 'time'!r}; its columns are {_some(headings)}"
         other = [s for s in SEPARATORS if s in line and s not in candidates]
         if len(headings) == 1 and other:
             return f"{rule}; its cells seem to be separated by {SEPARATORS[other[0]]}: state separator"
@@ -138,6 +156,12 @@ class Table:
                 rule += "; if its numbers have decimal commas, separate the cells by semicolons"
             raise RecordingError(self._name, rule)
         return row
+
+
+def _some(headings: Sequence[str]) -> str:
+    """Return headings for a message, the first of many."""
+    shown = ", ".join(repr(heading[:60]) for heading in headings[:20])
+    return f"[{shown}{', ...' if len(headings) > 20 else ''}]"
 
 
 def _text(name: str, data: bytes) -> str:

@@ -47,6 +47,9 @@ _DTYPES = {
 }
 
 
+_RANGES = {"level": (0, 2), "status": (0, 2), "case": (0, 5), "triangle": (-1, 2**31 - 1)}
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A whole recording: the columns of `FrameBlock` for all F frames.
@@ -233,10 +236,25 @@ class _Assembly:
         frames = len(self._frames)
         column = topic.columns.pop(path, None)
         if column is None and (count == 0 or not len(topic.time)) and topic.messages is None:
-            column = np.zeros((len(topic.time), *(() if count is None else (count,))))
+            column = np.zeros((len(topic.time), *(() if count is None else (count,))), _DTYPES.get(path, np.float64))
         if column is None or column.shape[1:] != (() if count is None else (count,)):
             raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is missing or misshapen")
-        return column[:frames].astype(_DTYPES.get(path, np.float64), copy=False)
+        least, most = self._range(path)
+        kind = _DTYPES.get(path, np.float64)
+        if column.dtype.kind not in ("f" if kind is np.float64 else "b" if kind is np.bool_ else "iu"):
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is of another type")
+        column = column[:frames]
+        if path in _DTYPES and column.size and not (column.min() >= least and column.max() <= most):
+            wrong = int(column.min() if column.min() < least else column.max())
+            rule = f"{wrong}, which is none of {least} to {most}"
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is {rule}")
+        return column.astype(kind, copy=False)
+
+    def _range(self, path: str) -> tuple[int, int]:
+        """Return the least and the largest value of a field that counts or names something."""
+        if path == "shape":
+            return -1, len(self._layout.shapes) - 1
+        return _RANGES.get(path, (0, 1))
 
     def _check_names(self, topic: Topic, path: str, names: tuple[str, ...]) -> None:
         if any(topic.texts.get(path.format(index)) != name for index, name in enumerate(names)) and len(self._frames):
