@@ -77,7 +77,7 @@ class RerunFile:
     def arrange(self, blueprint: Any) -> None:
         """Say how the viewer arranges the recording; `blueprint` is as of rerun.RecordingStream.send_blueprint."""
         noted = _Noted(blueprint)
-        self.stream.send_blueprint(noted, make_active=False)
+        self.stream.send_blueprint(noted)
         noted.stream.disconnect()
 
     def flush(self) -> None:
