@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import logging
 import tempfile
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,7 +102,7 @@ class Cluster:
             WorkerError: the scheduler does not answer.
             NoSpaceError: the disk is too full for a file that came back.
         """
-        with contextlib.closing(self._connect()) as client:
+        with _librarys_log_silent(), contextlib.closing(self._connect()) as client:
             crew = _Crew(client, self._tell)
             executor = client.get_executor(pure=False)
             ordered = sorted(tasks, key=lambda task: (-task.cost, task.name))
@@ -133,6 +134,22 @@ class Cluster:
         except (OSError, ValueError) as error:
             cause = f"{error}: {error.__cause__}" if error.__cause__ else error
             raise WorkerError(f"the Dask scheduler {self._address} does not answer ({cause})") from None
+
+
+@contextlib.contextmanager
+def _librarys_log_silent() -> Iterator[None]:
+    """Keep the library's tracebacks from the terminal: what they are about is told by each task in one line."""
+    import distributed  # noqa: F401 - it sets the levels
+
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
+    try:
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL)
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 class _Crew:

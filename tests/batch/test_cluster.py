@@ -1,5 +1,7 @@
 """A local Dask cluster: the same verdicts and the same bytes as without, also when one of its workers is killed."""
 
+import io
+import logging
 import signal
 import threading
 import time
@@ -144,6 +146,10 @@ def test_a_scheduler_that_dies_is_one_line_a_scenario(cluster, tmp_path, monkeyp
                 cluster.scheduler.send_signal(signal.SIGKILL)
 
     scenarios = [scenes.scene("good", duration=3), *(scenes.scene(f"hang_{k}") for k in range(3))]
+    logged = io.StringIO()
+    handler = logging.StreamHandler(logged)
+    for name in ("distributed", "distributed.client"):
+        monkeypatch.setattr(logging.getLogger(name), "handlers", [handler])
     begin = time.monotonic()
     out = tmp_path / "out"
     run = run_all(scenarios, out, rrd=False, execution=Execution(dask=cluster.address), watch=Killer())
@@ -154,4 +160,4 @@ def test_a_scheduler_that_dies_is_one_line_a_scenario(cluster, tmp_path, monkeyp
         **{f"hang_{k}": lost for k in range(3)},
     }
     assert not run.interrupted
-    assert capfd.readouterr().err == ""
+    assert (logged.getvalue(), capfd.readouterr().err) == ("", "")
