@@ -16,6 +16,7 @@ ROOMS = (
     "limits",
     "json_text",
     "numerics",
+    "language",
     "geometry",
     "logs",
     "kinematics",

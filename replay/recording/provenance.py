@@ -32,8 +32,6 @@ RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
 
-_SOURCES = (".py", ".binpb")
-
 
 @dataclass(frozen=True)
 class Provenance:
@@ -69,7 +67,7 @@ class Provenance:
 
     def to_metadata(self) -> dict[str, str]:
         """Return the values of the MCAP metadata record, each as JSON with sorted keys; `originals` only if any."""
-        values = vars(self) | {"layout": vars(self.layout)}
+        values = vars(self) | {"layout": self.layout.to_json()}
         if not self.originals:
             del values["originals"]
         return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
@@ -92,30 +90,20 @@ class Provenance:
             known = typed({name: read_json(written[name]) for name in _WRITTEN if name in written}, _Written)
         except (KeyError, TypeError, ValueError) as error:
             raise RecordingError(file, f"damaged: its metadata cannot be used ({error})") from None
-        names = {group: tuple(known["layout"][group]) for group in _GROUPS}  # type: ignore[literal-required]
-        if sum(map(len, names.values())) > limits.NAMES:
+        if sum(map(len, known["layout"].values())) > limits.NAMES:
             raise LimitError(file, f"has more than {limits.NAMES} names of links, joints, pairs and sensors")
-        if len(names["joints"]) != len(names["joint_units"]):
+        try:
+            layout = Layout.from_json(known["layout"])
+        except KeyError as error:
+            raise RecordingError(file, f"damaged: its metadata has no names of {error}") from None
+        if len(layout.joints) != len(layout.joint_units):
             raise RecordingError(file, "damaged: its metadata has joints without a unit, or units without a joint")
-        return Provenance(**{**known, "layout": Layout(**names)})  # type: ignore[arg-type]
+        return Provenance(**{**known, "layout": layout})  # type: ignore[arg-type]
 
 
 _Names = Annotated[list[str], FailFast()]
 _Count = Annotated[int, Field(ge=0, lt=1 << 53)]
-
-
 _Option = str | int | float | bool | None
-
-
-class _Layout(TypedDict):
-    links: _Names
-    joints: _Names
-    joint_units: _Names
-    shapes: _Names
-    pairs: _Names
-    distance_sensors: _Names
-    capacitive_sensors: _Names
-    objects: _Names
 
 
 class _Written(TypedDict):
@@ -124,7 +112,7 @@ class _Written(TypedDict):
     scenario: str
     root: str
     frames: _Count
-    layout: _Layout
+    layout: dict[str, _Names]
     model: dict[str, _Option | dict[str, _Option]]
     files: dict[str, str]
     code: str
@@ -136,7 +124,6 @@ class _Written(TypedDict):
 
 
 _WRITTEN = tuple(_Written.__annotations__)
-_GROUPS = tuple(_Layout.__annotations__)
 
 
 def sha256(data: bytes) -> str:
@@ -197,6 +184,6 @@ def _sources(folder: Traversable, prefix: str) -> list[tuple[str, bytes]]:
         if entry.is_dir():
             if entry.name != "__pycache__":
                 found += _sources(entry, f"{prefix}{entry.name}/")
-        elif entry.name.endswith(_SOURCES):
+        elif entry.name.endswith(".py"):
             found.append((prefix + entry.name, entry.read_bytes()))
     return found

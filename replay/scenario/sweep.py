@@ -14,9 +14,10 @@ from pydantic import Field, StringConstraints, model_validator
 
 from replay import limits
 from replay.errors import Problem, ScenarioError
-from replay.scenario.fields import Part, rejected
-from replay.scenario.node import Node, Place
+from replay.language.fields import Part, rejected
+from replay.language.node import Node, Place
 from replay.scenario.source import dotted
+from replay.sensing.kinds import KINDS
 
 MAX_CASES: Final = limits.SWEEP_CASES
 MAX_NAME: Final = 100
@@ -30,8 +31,7 @@ _MAY_BE_LEFT_OUT: Final = {
     ("collision",),
     ("model",),
     ("model", "collision"),
-    ("model", "distance"),
-    ("model", "capacitive"),
+    *(("model", kind) for kind in KINDS),
 }
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
 

@@ -14,8 +14,8 @@ from typing import Any, Final
 
 from replay import limits
 from replay.errors import Problem
-from replay.scenario import decimal_comma
-from replay.scenario.node import Node, Place, Scalar
+from replay.language import decimal_comma
+from replay.language.node import Node, Place, Scalar
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "Node", "parse"]
 
