@@ -169,7 +169,7 @@ class _Crew:
         self._next = now + _SECONDS_BETWEEN_LOOKS
         try:
             workers = self._client.nthreads()
-        except OSError:
+        except Exception:  # whatever the library raises where the connection is lost just now
             return False
         if workers:
             self._told, self._seen = False, now

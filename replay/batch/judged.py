@@ -59,6 +59,7 @@ class Judged:
         result: of its run; None when it was skipped.
         comparison: with its baseline; None when there was none to make.
         drawings: of its signals that differ.
+        undrawn: there are more, for which the page has no room.
         source: file that it was read from, as the user named it.
     """
 
@@ -68,6 +69,7 @@ class Judged:
     result: CaseResult | None = None
     comparison: Case | None = None
     drawings: tuple[Plot, ...] = ()
+    undrawn: bool = False
     source: str = ""
 
 

@@ -12,6 +12,7 @@ from typing import Literal
 
 from replay.batch.baseline import Baseline, Entry
 from replay.batch.case import CaseResult, Status
+from replay.batch.drawings import Album
 from replay.batch.history import check_history
 from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, Verdict
 from replay.batch.run import Execution, Run, run_all
@@ -85,11 +86,13 @@ def regress(
     if run.interrupted:
         watch = Unwatched()  # it has told its request; another one ends the comparison too
     judged: dict[str, Judged] = {}
+    album = Album()
     ran = list(zip(selection.chosen, run.results, strict=False))  # those that failed before come after these
     try:
         for scenario, result in ran:
             watch.compare(scenario.name)
-            judged[scenario.name] = _judge(scenario, result, accepted, rules, missing, overlay=rrd != "none")
+            item = _judge(scenario, result, accepted, rules, missing, overlay=rrd != "none")
+            judged[scenario.name] = album.keep(item)
         judged |= _created(judged, accepted)
         if rrd == "failing" and not run.interrupted:
             failing = {j.name for j in judged.values() if not j.verdict.fine and j.result and j.result.status.recorded}

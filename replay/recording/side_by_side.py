@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from replay.errors import ViewerError
 from replay.recording import blueprint
+from replay.recording.own_folder import own_folder
 from replay.recording.rerun_file import RerunFile
 from replay.recording.scene_view import Floats
 
@@ -45,8 +45,8 @@ def one_recording(files: Sequence[Path]) -> Iterator[Path]:
                 pass
         yield files[0]
         return
-    with tempfile.TemporaryDirectory(prefix="replay-") as folder:
-        target = Path(folder) / "side_by_side.rrd"
+    with own_folder() as folder:
+        target = folder / "side_by_side.rrd"
         write_side_by_side(files, target)
         yield target
 

@@ -9,7 +9,6 @@ import os
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.errors import ViewerError
+from replay.recording.own_folder import own_folder
 
 LOOPBACK = "127.0.0.1"
 _ENDING = 10.0  # [s] until a viewer that is asked to end is killed
@@ -68,11 +68,10 @@ class Quarters:
 @contextlib.contextmanager
 def quarters() -> Iterator[Quarters]:
     """Give a viewer a home, which is gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="replay-view-", ignore_cleanup_errors=True) as name:
-        home = Path(name)
+    with own_folder() as home:
         environment = {key: value for key, value in os.environ.items() if key != _LOUD}
         environment.setdefault("XAUTHORITY", str(Path.home() / ".Xauthority"))  # what a window needs of the true home
-        environment |= dict.fromkeys((*_HOME, *_TEMPORARY), name) | _QUIET
+        environment |= dict.fromkeys((*_HOME, *_TEMPORARY), str(home)) | _QUIET
         refused = {"analytics_enabled": False, "analytics_id": "", "metadata": {}}
         for place in (home / "rerun", home / "Library" / "Application Support" / "rerun"):  # the second is macOS's
             place.mkdir(parents=True)
