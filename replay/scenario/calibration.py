@@ -60,7 +60,7 @@ class SensorPath:
         self._start = sample(scene.linkage, scene.script, np.zeros(1))
         unit = replace(self.sensor, permittivity=1.0, stray_capacitance=0.0)
         self.method = scene.model.identity()["capacitive"]
-        self._suite = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
+        self._suite: Any = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
 
     def integral(self, positions: ArrayLike) -> Floats:
         """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated."""

@@ -38,7 +38,7 @@ METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
 
 
-def kernels(*, method: str, engine: str, savings: bool = True) -> tuple[Any, ...]:
+def kernels(*, method: str, engine: str = "own", savings: bool = True, **_numbers: int) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `DistanceSuite`."""
     used = (*entries_of(tree), each_inside)
     if method == "exact":
@@ -232,3 +232,6 @@ class DistanceSuite:
     def _rays(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
         triangles, pattern = self.targets[index].triangles, self._pattern(sensor)
         sweep_rays(triangles, self._trees[index], pose, pattern, rounding, sensor.range, index, nearest)
+
+
+SUITE = DistanceSuite
