@@ -51,8 +51,9 @@ def log_scene(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> Non
         drawing = sensor.drawing
         for name, corners in drawing.faces.items():
             chunks.add(entity(*path, name), {}, _face(corners, drawing.color))
-        outline = entity(*path, *(["outline"] if drawing.faces else []))
-        chunks.add(outline, {}, _lines(drawing.strips, drawing.color, drawing.width))
+        if drawing.strips:
+            outline = entity(*path, *(["outline"] if drawing.faces else []))
+            chunks.add(outline, {}, _lines(drawing.strips, drawing.color, drawing.width))
         for field in KINDS[sensor.kind].columns.fields():
             if field.beam:
                 chunks.add(beam_path(sensor.name), {}, _beam())

@@ -68,7 +68,8 @@ class SensorPath:
         states = np.repeat(self._start.positions, len(at), axis=0)
         states[:, self._linkage.joint_names.index(self.joint.name)] = at
         poses = self._linkage.forward(states, np.repeat(self._start.free_poses, len(at), axis=0))
-        return self._suite.run(poses).capacitance[:, 0]
+        capacitance: Floats = self._suite.run(poses).capacitance
+        return capacitance[:, 0]
 
     def positions(self, curve: Curve) -> Floats:
         """Return a curve's abscissa as joint positions (n,) [rad or m].

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from replay.sensing.capacitive.sensor import CapacitiveSensor
 
 _COLOR = (216, 140, 60, 255)
-_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+_CORNERS = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 
 
 class Capacitive(SensorKind):
@@ -55,7 +55,7 @@ class Capacitive(SensorKind):
     def drawing(self, sensor: CapacitiveSensor) -> Drawing:
         """See `SensorKind`: the plates, and their outlines."""
         corners = {
-            plate.name: transforms.apply(plate.T_link_plate, np.pad(_CORNERS * plate.half_size, ((0, 0), (0, 1))))
+            plate.name: transforms.apply(plate.T_link_plate, _CORNERS * np.append(plate.half_size, 0.0))
             for plate in sensor.plates
         }
         outlines = [four[[0, 1, 2, 3, 0]] for four in corners.values()]
