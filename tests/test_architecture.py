@@ -101,3 +101,37 @@ def test_functions_of_the_contract_resolve_after_import_replay_alone(name):
         check=True,
     )
     assert done.stdout.strip() == "True"
+
+
+KINDS = ("distance", "capacitive")
+OF_A_KIND = ("scenario/calibration.py",)  # fits one kind's constants to a measured curve
+
+
+def names_in(path: Path) -> set[str]:
+    """Return attributes, imported modules and texts that are more than part of a sentence."""
+    tree = ast.parse(path.read_text())
+    found = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+    return found | {
+        node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+
+
+@pytest.mark.parametrize("room", ["language", "scenario", "simulation", "recording", "comparison", "batch"])
+def test_rooms_know_no_kind_of_sensor_by_name(room):
+    paths = [PACKAGE / f"{room}.py"] if room == "simulation" else sorted((PACKAGE / room).rglob("*.py"))
+    for path in paths:
+        if str(path.relative_to(PACKAGE)) in OF_A_KIND:
+            continue
+        for kind in KINDS:
+            forms = {kind, f"/{kind}", f"/{kind}/", f"{kind}_sensors"}
+            named = {n for n in names_in(path) if n in forms or n.startswith(f"replay.sensing.{kind}")}
+            assert not named, f"{path} knows {named}; loop over sensing.kinds instead"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_kinds_of_sensors_do_not_know_each_other(kind):
+    others = [other for other in KINDS if other != kind]
+    for path in sorted((PACKAGE / "sensing" / kind).rglob("*.py")):
+        named = {n for n in names_in(path) for other in others if n.startswith(f"replay.sensing.{other}")}
+        assert not named, f"{path} imports {named}"

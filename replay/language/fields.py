@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, StrictBool, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    StrictBool,
+    StringConstraints,
+    create_model,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from replay.language.units import Angle, Length, Number, Size
@@ -19,6 +27,12 @@ class Part(BaseModel):
     """A mapping of the language: unknown keys are errors, and nothing changes after validation."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, hide_input_in_errors=True)
+
+
+def with_keys(base: type[Part], **keys: tuple[Any, Any]) -> Any:
+    """Return a part of the same name, without its leading "_", with more keys: each a type and pydantic's `Field`."""
+    name = base.__name__.removeprefix("_")
+    return create_model(name, __base__=base, __module__=base.__module__, __doc__=base.__doc__, **keys)  # type: ignore[call-overload]
 
 
 def rejected(rule: str, at: tuple[str | int, ...] = ()) -> PydanticCustomError:

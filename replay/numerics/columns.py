@@ -49,7 +49,8 @@ class Field:
         label: what tables call it; its name in words when left out.
         states: the enumeration that names its values.
         letters: of the components of a vector, a last axis of the column.
-        each: the names of the layout that it has a value for each of, a last axis of the column; "" for one value.
+        each: the names of the layout that it has a value for each of, a last axis of the column; "" for one value. A
+            sensor's field with `each` has no letters, events, chart or beam.
         names: the names of the layout that its values count; what is below 0 names nothing.
         chart: title of the chart that shows it over time; "" for none.
         beam: it is a point in world coordinates, drawn at the end of a line from its sensor.

@@ -12,7 +12,7 @@ from replay.recording import blueprint
 from replay.recording.rerun_columns import Chunks, Column, column, constants, entity, packed, row
 from replay.recording.scene_view import BodyView, Floats, SceneView
 from replay.recording.surfaces import corner_normals
-from replay.sensing.kind import Color, Outline
+from replay.sensing.kind import Color
 from replay.sensing.kinds import KINDS
 
 BEAM = (255, 235, 90, 255)
@@ -48,8 +48,12 @@ def log_scene(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> Non
     _log_bodies(chunks, scene, colored)
     for sensor in scene.sensors:
         path = [blueprint.SCENE, scene.links[sensor.link], f"{sensor.kind}_sensors", sensor.name]
-        for part in sensor.drawing.outlines:
-            chunks.add(entity(*path, *([part.name] if part.name else [])), {}, _outline(part))
+        drawing = sensor.drawing
+        for name, corners in drawing.faces.items():
+            chunks.add(entity(*path, name), {}, _face(corners, drawing.color))
+        if drawing.strips:
+            outline = entity(*path, *(["outline"] if drawing.faces else []))
+            chunks.add(outline, {}, _lines(drawing.strips, drawing.color, drawing.width))
         for field in KINDS[sensor.kind].columns.fields():
             if field.beam:
                 chunks.add(beam_path(sensor.name), {}, _beam())
@@ -66,13 +70,10 @@ def _log_bodies(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> N
         chunks.add(body_path(scene, body), {}, _mesh(corners[begin:end], normals[begin:end], color))
 
 
-def _outline(part: Outline) -> list[Column]:
-    if part.face is None:
-        return _lines(part.strips, part.color, part.width)
-    a, b, c, d = part.face
-    across = np.cross(b - a, d - a)
+def _face(corners: Floats, color: Color) -> list[Column]:
+    across = np.cross(corners[1] - corners[0], corners[3] - corners[0])
     normals = np.broadcast_to(across / np.linalg.norm(across), (6, 3))
-    return _mesh(np.stack([a, b, c, a, c, d]), normals, part.color)
+    return _mesh(corners[[0, 1, 2, 0, 2, 3]], normals, color)
 
 
 def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:

@@ -60,7 +60,7 @@ class SensorPath:
         self._start = sample(scene.linkage, scene.script, np.zeros(1))
         unit = replace(self.sensor, permittivity=1.0, stray_capacitance=0.0)
         self.method = scene.model.identity()["capacitive"]
-        self._suite = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
+        self._suite: Any = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
 
     def integral(self, positions: ArrayLike) -> Floats:
         """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated."""
@@ -68,7 +68,8 @@ class SensorPath:
         states = np.repeat(self._start.positions, len(at), axis=0)
         states[:, self._linkage.joint_names.index(self.joint.name)] = at
         poses = self._linkage.forward(states, np.repeat(self._start.free_poses, len(at), axis=0))
-        return self._suite.run(poses).capacitance[:, 0]
+        capacitance: Floats = self._suite.run(poses).capacitance
+        return capacitance[:, 0]
 
     def positions(self, curve: Curve) -> Floats:
         """Return a curve's abscissa as joint positions (n,) [rad or m].

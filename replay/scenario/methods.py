@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pydantic import Field, create_model
+from pydantic import Field
 
-from replay.language.fields import Part, rejected
+from replay.language.fields import Part, rejected, with_keys
 from replay.sensing.kinds import KINDS
 
 METHOD_REVISIONS: Final = {
@@ -70,25 +70,17 @@ class _Model(Part):
 if TYPE_CHECKING:
     Model = _Model
 else:
-    Model = create_model(
-        "Model",
-        __base__=_Model,
-        __module__=__name__,
-        __doc__=_Model.__doc__,
-        **{
-            kind.name: (kind.method, Field(kind.method(), description=f"Version of the {kind.name} method."))
-            for kind in KINDS.values()
-        },
-    )
+    _keys = {
+        name: (kind.method, Field(kind.method(), description=f"Version of the {name} method."))
+        for name, kind in KINDS.items()
+    }
+    Model = with_keys(_Model, **_keys)
 
 _COLLISION = {
     "thesis2015": CollisionMethod(bounds="obb_vertices", narrowphase="gjk", pieces="convex", clearance="never")
 }
 BUILTIN_MODELS: Final = {
-    name: Model(
-        collision=collision,
-        **{kind.name: kind.models[name] for kind in KINDS.values() if name in kind.models},
-    )
+    name: Model(collision=collision, **{kind.name: kind.models[name] for kind in KINDS.values() if name in kind.models})
     for name, collision in _COLLISION.items()
 }
 """Models by name: `thesis2015` are the methods of the thesis itself."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pydantic import Field, create_model
+from pydantic import Field
 
-from replay.language.fields import Name, Part
+from replay.language.fields import Name, Part, with_keys
 from replay.sensing.kinds import KINDS
 
 
@@ -26,16 +26,8 @@ class _Sensors(Part):
 if TYPE_CHECKING:
     Sensors = _Sensors
 else:
-    Sensors = create_model(
-        "Sensors",
-        __base__=_Sensors,
-        __module__=__name__,
-        __doc__=_Sensors.__doc__,
-        **{
-            kind.name: (
-                dict[Name, kind.part],
-                Field(default_factory=dict, description=f"{kind.name.capitalize()} sensors."),
-            )
-            for kind in KINDS.values()
-        },
-    )
+    _keys = {
+        name: (dict[Name, kind.part], Field(default_factory=dict, description=f"{name.capitalize()} sensors."))
+        for name, kind in KINDS.items()
+    }
+    Sensors = with_keys(_Sensors, **_keys)

@@ -1,8 +1,8 @@
 """What the house knows of a kind of sensor: one description, which every room loops over.
 
 A kind is a folder of this room with a `SensorKind` in it, and a line in `kinds`. Its YAML part, its methods, how it is
-computed, drawn and charted, and the table of what it reads stand there; nothing else in the house names it. Modules
-that a description imports at their top must be light: `replay validate` loads them.
+computed, drawn and charted, and the table of what it reads stand there; nothing else in the house names it. What a
+description imports at its top must be light: `replay validate` loads it.
 """
 
 from __future__ import annotations
@@ -73,35 +73,21 @@ class Expected:
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
-    """A part of a drawn sensor, in its link's frame [m].
-
-    Attributes:
-        name: of the part; "" for the sensor itself.
-        strips: line strips (k, 3).
-        color: of the lines, and of the face; `width` of the lines, in pixels.
-        face: (4, 3), corners of a rectangle that is filled, counter-clockwise seen from its front; drawn instead of
-            strips.
-    """
-
-    name: str
-    color: Color
-    strips: tuple[Floats, ...] = ()
-    width: float = 1.0
-    face: Floats | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Drawing:
-    """How a sensor is drawn.
+    """How a sensor is drawn, in its link's frame [m].
 
     Attributes:
-        outlines: its parts.
-        extent: (k, 3) [m] points in its link's frame that the first picture shows; a `beam` begins at the first.
+        color: of lines and faces; `width` of lines, in pixels.
+        strips: line strips (k, 3).
+        faces: rectangles by name, (4, 3) corners, counter-clockwise seen from the front.
+        extent: (k, 3) points that the first picture shows; a `beam` begins at the first.
     """
 
-    outlines: tuple[Outline, ...]
+    color: Color
+    width: float
+    strips: Sequence[Floats]
     extent: Floats
+    faces: Mapping[str, Floats]
 
 
 class SensorKind(ABC):
@@ -138,21 +124,30 @@ class SensorKind(ABC):
         """Return the topic of a sensor."""
         return f"/{self.name}/{sensor}"
 
-    @abstractmethod
-    def sensor(self, name: str, part: Any, link: int, ignored_links: frozenset[int]) -> Any:
-        """Return a sensor of how it is written, on a link by its index; it has a `name` and a `link`."""
-
-    @abstractmethod
-    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Any, *, savings: bool) -> Suite:
+    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
         """Return the sensors of a scene; see `simulation.simulate` for `savings`.
 
         Raises:
             MissingPackageError: the method names an engine that is not installed.
         """
+        made: Suite = self.module().SUITE(sensors, targets, method=method.method, savings=savings, **method.options())
+        return made
+
+    def kernels(self, method: Method, *, savings: bool) -> tuple[Any, ...]:
+        """Return the kernels that such a suite calls."""
+        found: tuple[Any, ...] = self.module().kernels(method=method.method, savings=savings, **method.options())
+        return found
 
     @abstractmethod
-    def kernels(self, method: Any, *, savings: bool) -> tuple[Any, ...]:
-        """Return the kernels that such a suite calls."""
+    def module(self) -> Any:
+        """Return, imported now, the module with the class `SUITE` of its suites and the function `kernels`.
+
+        Both take `method`, `savings` and the options of the method.
+        """
+
+    @abstractmethod
+    def sensor(self, name: str, part: Any, link: int, ignored_links: frozenset[int]) -> Any:
+        """Return a sensor of how it is written, on a link by its index; it has a `name` and a `link`."""
 
     @abstractmethod
     def drawing(self, sensor: Any) -> Drawing:

@@ -131,10 +131,8 @@ def test_the_view_shows_every_shape_cone_and_plate(scene: Scene) -> None:
     assert np.allclose(np.ptp(bar.triangles.reshape(-1, 3), axis=0), [2, 0.1, 0.1])
     cone, skin = shown.sensors
     assert (cone.kind, cone.name, skin.kind, skin.name) == ("distance", "ahead", "capacitive", "skin")
-    (outline,) = cone.drawing.outlines
-    rim = outline.strips[-1] - cone.drawing.extent[0]
-    assert outline.name == "" and np.allclose(np.linalg.norm(rim, axis=1), 1.0)
-    left, edges = skin.drawing.outlines
-    assert (left.name, edges.name) == ("left", "outline") and left.face is not None
-    assert np.allclose(np.linalg.norm(np.diff(left.face, axis=0), axis=1), [0.05, 0.2, 0.05])
+    rim = cone.drawing.strips[-1] - cone.drawing.extent[0]
+    assert not cone.drawing.faces and np.allclose(np.linalg.norm(rim, axis=1), 1.0)
+    assert list(skin.drawing.faces) == ["left"] and len(skin.drawing.strips) == 1
+    assert np.allclose(np.linalg.norm(np.diff(skin.drawing.faces["left"], axis=0), axis=1), [0.05, 0.2, 0.05])
     assert set(shown.texts) == {"two_boxes.yaml", "parts/sensors.yaml"}

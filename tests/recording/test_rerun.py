@@ -23,8 +23,8 @@ from replay.recording.rerun_scene import extent
 from replay.recording.scene_view import BodyView, indexed
 from replay.recording.surfaces import corner_normals
 from replay.recording.viewer_process import viewer_binary
-from replay.sensing.distance.kind import cone_strips
 from tests.recording import moving
+from tests.recording.synthetic import drawn
 
 FRAMES = 300
 Rows = dict[int, list[object]]
@@ -202,7 +202,7 @@ def test_cones_have_their_aperture_and_range() -> None:
     cone = moving.CONE
     apex = cone.T_link_sensor[:3, 3]
     axis = cone.T_link_sensor[:3, 2]
-    ends = np.concatenate([strip[-1:] for strip in cone_strips(cone)]) - apex
+    ends = np.concatenate([strip[-1:] for strip in drawn("distance", cone).drawing.strips]) - apex
     assert np.allclose(np.linalg.norm(ends, axis=1), cone.range)
     assert np.allclose(np.arccos(ends @ axis / cone.range), cone.aperture / 2)
 

@@ -37,7 +37,7 @@ SMALLEST_RTOL = 1e-12
 """Below it the tolerance would be lost in the rounding of a sum of many triangles."""
 
 
-def kernels(*, method: str, savings: bool = True) -> tuple[Any, ...]:
+def kernels(*, method: str, savings: bool = True, **_numbers: float) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `CapacitiveSuite`."""
     own = (*entries_of(clusters), sum_tree) if method == "tree" and savings else (sum_triangles,)
     return (*entries_of(tree), triangle_areas, plates_inside, *own)
@@ -188,6 +188,9 @@ class CapacitiveSuite:
             triangles, areas = self._triangles[target_index], self._areas[target_index]
             integral, touching = sum_triangles(triangles, areas, T, rounding, half_sizes, both, facing, self._splits)
         return integral / scale, touching
+
+
+SUITE = CapacitiveSuite
 
 
 def _power_of_two(triangles: Floats) -> float:

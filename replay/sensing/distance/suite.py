@@ -22,7 +22,6 @@ from replay.sensing.distance.closest import check_aperture, check_range
 from replay.sensing.distance.columns import DistanceColumns
 from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.counters import DistanceCounters
-from replay.sensing.distance.covered import CoveredSensors
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact, sweep_scan
 from replay.sensing.distance.query import COUNTS
@@ -36,9 +35,11 @@ Sweep = Callable[["DistanceSensor", int, Array, Array, Nearest], None]
 
 METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
+TOUCHING = 1e-9
+"""Readings up to this one [m] count as touching: what rounding leaves of a sensor that stands on a face."""
 
 
-def kernels(*, method: str, engine: str, savings: bool = True) -> tuple[Any, ...]:
+def kernels(*, method: str, engine: str = "own", savings: bool = True, **_numbers: int) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `DistanceSuite`."""
     used = (*entries_of(tree), each_inside)
     if method == "exact":
@@ -133,7 +134,7 @@ class DistanceSuite:
         self._savings = savings
         self.counters = DistanceCounters()
         self._sweep = self._sweeper(engine)
-        self._covered = CoveredSensors([sensor.name for sensor in sensors], [target.name for target in targets])
+        self._covered: NDArray[np.int32] | None = None
         self._frames, self._inside = 0, np.zeros((len(self.sensors), len(self.targets)), dtype=np.int64)
 
     def run(self, poses: LinkPoses) -> DistanceColumns:
@@ -173,17 +174,31 @@ class DistanceSuite:
             self._count_inside(column, nearest, T_target_sensor)
         self._frames += frames
         if frames:
-            self._covered.update(columns)
+            self._follow_covered(columns)
         return columns
 
     def notes(self) -> tuple[str, ...]:
-        """Return a line for each sensor that a body touched in all frames so far, or whose apex was inside of one."""
+        """Return a line for each sensor that a body touched in all frames so far, or whose apex was inside of one.
+
+        What touches in every frame is most likely a part that the sensor stands on and should ignore.
+        """
+        covered = (
+            f"distance sensor {self.sensors[s].name!r} touches {self.targets[t].name} in every frame; "
+            "let it ignore that link, or move it out"
+            for s, t in enumerate(self._covered if self._covered is not None else ())
+            if t >= 0
+        )
         inside = (
             f"distance sensor {self.sensors[s].name!r} is inside {self.targets[t].name} in {self._inside[s, t]} of "
             f"{count(self._frames, 'frame')}; it reads the surface around it, from within"
             for s, t in np.argwhere(self._inside).tolist()
         )
-        return *self._covered.notes(), *inside
+        return *covered, *inside
+
+    def _follow_covered(self, columns: DistanceColumns) -> None:
+        touching = np.where(columns.distance <= TOUCHING, columns.shape, -1)
+        first = touching[0] if self._covered is None else self._covered
+        self._covered = np.where((touching == first).all(axis=0), first, -1)
 
     def _count_inside(self, column: int, nearest: Nearest, T_target_sensor: dict[int, Array]) -> None:
         for index, pose in T_target_sensor.items():
@@ -232,3 +247,6 @@ class DistanceSuite:
     def _rays(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
         triangles, pattern = self.targets[index].triangles, self._pattern(sensor)
         sweep_rays(triangles, self._trees[index], pose, pattern, rounding, sensor.range, index, nearest)
+
+
+SUITE = DistanceSuite
