@@ -10,7 +10,7 @@ from replay.batch.case import CaseResult
 from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import code_identity, library_versions
-from replay.recording.reader import read_provenance
+from replay.recording.reader import read_files, read_provenance
 from replay.recording.record import RecordedPaths
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
@@ -41,6 +41,7 @@ def earlier_result(
     try:
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)
+            read_files(log, found)  # are those that it states
         result = CaseResult.from_json(json.loads((folder / RESULT).read_text(encoding="utf-8")), paths)
     except RecordingError as error:
         return error.reason
