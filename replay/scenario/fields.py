@@ -6,7 +6,16 @@ import math
 import re
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, StrictBool, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    StrictBool,
+    StringConstraints,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from replay.scenario.units import Angle, Length, Number, Size
@@ -55,6 +64,16 @@ def _fits_file_systems(title: str) -> str:
 
 Title = Annotated[str, StringConstraints(pattern=_TITLE, max_length=100), AfterValidator(_fits_file_systems)]
 """Name of a scenario; it becomes the name of a folder and of files."""
+
+
+def is_title(name: str) -> bool:
+    """Return whether a scenario can have a name, which then is that of its folder and no way to another one."""
+    try:
+        TypeAdapter(Title).validate_python(name)
+    except ValidationError:
+        return False
+    return True
+
 
 Text = Annotated[str, StringConstraints(max_length=10_000)]
 Glob = Annotated[str, StringConstraints(min_length=1, max_length=200)]
