@@ -4,7 +4,17 @@ The names below are the public interface. They are resolved on first use, so tha
 numba, rerun, trimesh and scipy load only when something needs them.
 """
 
-from __future__ import annotations
+import os
+import sys
+
+if sys.argv[:1] == ["-m"] and not sys.flags.safe_path:
+    # `python -m replay` looks for modules in the current folder first; a typing.py that lies there is none of Python's.
+    # So nothing is imported above but what Python itself has imported by now, not even from __future__.
+    try:
+        if sys.path[0] == os.getcwd() != os.path.dirname(__path__[0]):  # noqa: PTH109, PTH120
+            del sys.path[0]
+    except OSError:  # the current folder is gone, and so on no path
+        pass
 
 import importlib
 import importlib.util

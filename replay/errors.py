@@ -1,4 +1,4 @@
-"""Everything `replay` raises on purpose, one class per cause, values kept as attributes; and how to say a count."""
+"""Everything `replay` raises on purpose, one class per cause, values kept as attributes; and how to say things."""
 
 from __future__ import annotations
 
@@ -10,8 +10,31 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
+_JOINERS = "\u200c\u200d"
+"""Show nothing, but are part of how words of some scripts, and emoji, are written."""
+
+
+def printable(text: str, *, keep: str = "") -> str:
+    """Return text with each character that shows nothing, or steers what shows it, as an escape such as `\\x1b`.
+
+    Names and texts of files may hold anything: control characters, marks that turn the direction of writing, line
+    breaks that make one line look like two, halves of characters that cannot be encoded.
+
+    Args:
+        text: of anyone.
+        keep: characters that stay, such as line breaks in a text of several lines.
+    """
+    if text.isprintable():
+        return text
+    keep += _JOINERS
+    return "".join(c if c.isprintable() or c in keep else c.encode("unicode_escape").decode() for c in text)
+
+
 class ReplayError(Exception):
     """Base of every error that `replay` raises on purpose; its text is one clear line for the user."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class InvalidValue(ReplayError):
@@ -37,7 +60,7 @@ class Problem:
 
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
-        return f"{place}: {self.message}" if place else self.message
+        return printable(f"{place}: {self.message}" if place else self.message)
 
 
 class ScenarioError(ReplayError):
@@ -46,6 +69,9 @@ class ScenarioError(ReplayError):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple({str(problem): problem for problem in problems}.values())
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.problems)
 
 
 class MotionLimitError(ReplayError):

@@ -6,7 +6,7 @@ import datetime
 from dataclasses import dataclass
 from pathlib import Path
 
-from replay.batch.baseline import Baseline, Entry
+from replay.batch.baseline import Baseline, Entry, check_name, check_scenario
 from replay.batch.case import Status
 from replay.batch.written import read_run
 from replay.comparison import wording
@@ -46,8 +46,9 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
     """Return what accepting a run folder would change.
 
     Raises:
-        InvalidValue: it is no run folder, the run was interrupted, or a scenario of it failed or broke an expectation.
-        RecordingError: a recording of the run cannot be read.
+        InvalidValue: it is no run folder, the run was interrupted, or a scenario of it failed or broke an expectation,
+            or has a name that is none.
+        RecordingError: a recording of the run cannot be read, is a link, or is of another scenario.
     """
     try:
         run = read_run(directory)
@@ -66,7 +67,9 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
     accepted = Baseline(baseline)
     entries, unchanged = {}, []
     for name in statuses:
+        check_name(name)
         recording = directory / name / f"{name}.mcap"
+        check_scenario(recording, name)
         what = _news(accepted.recording(name), recording)
         if what:
             entries[name] = Entry(recording, what)

@@ -229,7 +229,7 @@ def _unpacked(task: Task, future: Any) -> Ended:
     folder = task.payload.folder
     try:
         for name, data in parcel.files.items():
-            write_file(folder / name, data)
+            write_file(folder / Path(name).name, data)
     except NoSpaceError:
         raise
     except WriteError as error:

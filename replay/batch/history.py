@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 from replay import limits
 from replay.batch.written import read_night
 from replay.errors import WriteError
-from replay.logs.part_file import append_lines
+from replay.logs.part_file import append_lines, json_line
 
 
 @dataclass(frozen=True)
@@ -48,18 +47,18 @@ def check_history(path: Path | None) -> None:
     """Raise the WriteError now, before the night, that reading or appending would raise after it."""
     if path is not None:
         read_history(path)
-        append_lines(path, [])
+        append_lines(path, [], named=True)
 
 
-def append_night(path: Path, night: Night) -> None:
-    """Append a night; WriteError when that is not possible."""
+def append_night(path: Path, night: Night, *, named: bool = False) -> None:
+    """Append a night; WriteError when that is not possible. `named` as of `append_lines`."""
     entry = {
         "time": night.time,
         "version": night.version,
         "failing": sorted(night.failing),
         "verdicts": dict(night.verdicts),
     }
-    append_lines(path, [json.dumps(entry, ensure_ascii=False)])
+    append_lines(path, [json_line(entry)], named=named)
 
 
 def failing_since(nights: list[Night], name: str) -> str | None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import enum
-import json
 import os
 import pickle
 import queue
@@ -46,7 +45,7 @@ T = TypeVar("T")
 _SECONDS_BETWEEN_CHECKS = 0.1
 _SECONDS_TO_PREPARE = 1800.0  # compiling everything takes minutes on a slow machine; beyond this it hangs
 _FAILED_STARTS = 3
-_BEGIN = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from replay.batch.worker import main; main()"
+_BEGIN = "import sys; sys.path[:] = sys.argv[1:]; from replay.batch.worker import main; main()"
 
 
 class Ending(enum.Enum):
@@ -154,6 +153,7 @@ class Pool:
         prepared = False
         preparing = 1
         failed_starts = 0
+        told: set[str] = set()
         next_check = 0.0
         try:
             while waiting or any(worker.task for worker in workers):
@@ -175,7 +175,9 @@ class Pool:
                         continue  # it has been stopped; this was still on its way
                     match message:
                         case Told(text):
-                            self._tell(text)
+                            if text not in told:  # by another worker
+                                told.add(text)
+                                self._tell(text)
                         case Preparing(state):
                             self._preparing(state)
                         case Divisible():
@@ -222,7 +224,8 @@ class _Worker:
         self._memory = 0
         self._began = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, "-u", "-c", _BEGIN, json.dumps(sys.path)],  # what a task printed is in its log if it dies
+            # -P: not even `_BEGIN` imports from the current folder; -u: what a task printed is in its log if it dies
+            [sys.executable, "-P", "-u", "-c", _BEGIN, *import_path(start.work)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -310,6 +313,24 @@ class _Worker:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=5.0)  # so that its exit code is its own and not that of `stop`
         inbox.put((self, None))
+
+
+def import_path(work: Work) -> list[str]:
+    """Return where workers look for modules: where this process does, but for the current folder.
+
+    Whatever lies in the folder that a command is called in, such as a json.py, is none of its business. The folder that
+    this package, or the work, has been imported from stays, as for a checkout that is the current folder.
+    """
+    homes: set[str] = set()
+    for name in ("replay", work.__module__):
+        module = sys.modules[name.partition(".")[0]]
+        places = getattr(module, "__path__", None) or [getattr(module, "__file__", None)]
+        homes.update(os.path.realpath(Path(place).parent) for place in places if place)
+    with contextlib.suppress(OSError):  # the current folder may be gone
+        here = os.path.realpath(Path.cwd())
+        found = [here if folder == "" else folder for folder in sys.path]
+        return [folder for folder in found if os.path.realpath(folder) != here or here in homes]
+    return [folder for folder in sys.path if folder]
 
 
 def _known(value: T | None) -> T:

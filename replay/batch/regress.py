@@ -125,7 +125,8 @@ def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
 
 def _forget(directory: Path, names: Sequence[str]) -> None:
     """Remove an earlier night's reports and pictures, which would stand beside recordings of this one."""
-    shown = [directory / name / kind.format(name=name) for name in names for kind in ("{name}.rrd", OVERLAY)]
+    own = [name for name in names if not (directory / name).is_symlink()]
+    shown = [directory / name / kind.format(name=name) for name in own for kind in ("{name}.rrd", OVERLAY)]
     for file in (directory / JUNIT, directory / INDEX, *shown):
         with contextlib.suppress(OSError):
             file.unlink(missing_ok=True)
@@ -234,6 +235,8 @@ def _show(
         KeyboardInterrupt: it was ended.
     """
     again = run.directory / ".rrd"
+    if again.is_symlink():
+        again.unlink()
     try:
         chosen = [scenario for scenario in scenarios if scenario.name in failing]
         if not chosen:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 import replay
@@ -57,7 +55,7 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
         for item in ordered
     ]
     failing = [row for row in rows if not row.item.verdict.fine]
-    page: str = _template().render(
+    page: str = report_html.template("replay.batch", "index.html.j2").render(
         found=found,
         rows=rows,
         failing=len(failing),
@@ -92,15 +90,8 @@ def _log(found: Regression, item: Judged) -> str:
 def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
     folder = found.run.directory / item.name
     names = [name.format(name=item.name) for name in _FILES]
-    links = [(name, f"{quote(item.name)}/{quote(name)}") for name in names if (folder / name).is_file()]
+    home = quote(os.fsencode(item.name))
+    links = [(name, f"{home}/{quote(os.fsencode(name))}") for name in names if (folder / name).is_file()]
     if item.comparison is not None:
         links.append(("baseline", Path(item.comparison.baseline).resolve().as_uri()))
     return tuple(links)
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    return environment.from_string(resources.files("replay.batch").joinpath("index.html.j2").read_text("utf-8"))

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import platform
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
 import replay
 from replay.batch.judged import Judged, Regression, Verdict
+from replay.comparison.report_junit import clean
 from replay.comparison.report_text import text
 from replay.comparison.runs import RunDifference
 
 SUITE = "replay.regress"
 FAILURES = (Verdict.DIFFERENT, Verdict.BROKEN, Verdict.MISSING)
-
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit(found: Regression) -> bytes:
@@ -32,7 +30,7 @@ def junit(found: Regression) -> bytes:
             "package": "replay",
             "name": SUITE,
             "timestamp": found.run.started.strftime("%Y-%m-%dT%H:%M:%S"),
-            "hostname": _clean(platform.node()) or "localhost",
+            "hostname": clean(platform.node()) or "localhost",
             "tests": str(len(found.judged)),
             "failures": str(failures),
             "errors": str(len(found.judged) - fine - failures),
@@ -48,7 +46,7 @@ def junit(found: Regression) -> bytes:
         ("unused baselines", ", ".join(found.unused)),
         ("interrupted", "yes" if found.run.interrupted else "no"),
     ):
-        ElementTree.SubElement(properties, "property", {"name": name, "value": _clean(value)})
+        ElementTree.SubElement(properties, "property", {"name": name, "value": clean(value)})
     for item in found.judged:
         _case(suite, found, item)
     for name in ("system-out", "system-err"):
@@ -60,14 +58,14 @@ def junit(found: Regression) -> bytes:
 
 def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
     seconds = 0.0 if item.result is None else item.result.seconds
-    attributes = {"name": _clean(item.name), "classname": SUITE, "time": f"{seconds:.3f}"}
+    attributes = {"name": clean(item.name), "classname": SUITE, "time": f"{seconds:.3f}"}
     case = ElementTree.SubElement(suite, "testcase", attributes)
     if item.verdict.left_out:
-        ElementTree.SubElement(case, "skipped", {"message": _clean(item.message)})
+        ElementTree.SubElement(case, "skipped", {"message": clean(item.message)})
     elif not item.verdict.fine:
         tag = "failure" if item.verdict in FAILURES else "error"
-        problem = ElementTree.SubElement(case, tag, {"message": _clean(item.message), "type": item.verdict.value})
-        problem.text = _clean(_details(found, item))
+        problem = ElementTree.SubElement(case, tag, {"message": clean(item.message), "type": item.verdict.value})
+        problem.text = clean(_details(found, item))
 
 
 def _details(found: Regression, item: Judged) -> str:
@@ -75,8 +73,3 @@ def _details(found: Regression, item: Judged) -> str:
         return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
     log = Path(found.run.directory) / item.name / "log.txt"
     return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])
-
-
-def _clean(value: str) -> str:
-    """Return text without the characters that XML cannot hold, not even escaped."""
-    return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", value)

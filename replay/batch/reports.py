@@ -27,7 +27,7 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
     Raises:
         WriteError: a file cannot be written; when it is the history, the others have been.
     """
-    history = history or found.run.directory / HISTORY
+    named, history = history is not None, history or found.run.directory / HISTORY
     unknown: WriteError | None = None
     try:
         nights = read_history(history)
@@ -59,7 +59,7 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
     if unknown is not None:
         raise unknown
     if not found.run.interrupted:
-        append_night(history, Night(started, replay.__version__, verdicts(found), failing))
+        append_night(history, Night(started, replay.__version__, verdicts(found), failing), named=named)
 
 
 def describe(found: Regression) -> list[str]:

@@ -10,7 +10,7 @@ from replay.batch.written import RESULT, read_result
 from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import code_identity, library_versions
-from replay.recording.reader import read_provenance
+from replay.recording.reader import read_files, read_provenance
 from replay.recording.record import RecordedPaths
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
@@ -39,6 +39,7 @@ def earlier_result(
     try:
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)
+            read_files(log, found)  # are those that it states
         result = CaseResult.from_json(read_result(folder / RESULT), paths)
     except RecordingError as error:
         return error.reason

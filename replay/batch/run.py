@@ -28,8 +28,8 @@ from replay.batch.resume import earlier_result
 from replay.batch.tls import Certificates
 from replay.batch.watch import Unwatched, Watch
 from replay.batch.written import RESULT
-from replay.errors import NoSpaceError, RecordingExistsError, WriteError
-from replay.logs.part_file import append_lines, write_file
+from replay.errors import NoSpaceError, RecordingExistsError, WriteError, printable
+from replay.logs.part_file import append_lines, refuse_link, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -149,8 +149,7 @@ def run_all(
 
     write_summary()
     for result in failed:
-        with contextlib.suppress(OSError):  # what an earlier run said
-            (directory / result.name / "log.txt").unlink(missing_ok=True)
+        _remove_unfinished(directory / result.name)  # with what an earlier run said
         _finish(result, directory / result.name)
     try:
         watch.plan(costs)
@@ -158,6 +157,7 @@ def run_all(
         for scenario in left:
             log = directory / scenario.name / "log.txt"
             try:
+                refuse_link(log.parent)
                 write_file(log, "")
             except WriteError as error:
                 results[scenario.name] = _unwritable(scenario.name, error)
@@ -234,13 +234,13 @@ def _finish(result: CaseResult, folder: Path) -> CaseResult:
     Returns:
         The result, or that the folder cannot be written.
     """
-    if not result.status.recorded:
-        for kind in (".mcap", ".rrd"):
+    try:
+        refuse_link(folder)
+        for kind in () if result.status.recorded else (".mcap", ".rrd"):
             with contextlib.suppress(OSError):
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
-    try:
         write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
-        append_lines(folder / "log.txt", describe(result))
+        append_lines(folder / "log.txt", map(printable, describe(result)))
     except WriteError as error:
         return dataclasses.replace(_unwritable(result.name, error), seconds=result.seconds, memory=result.memory)
     return result
@@ -255,7 +255,7 @@ def _unwritable(name: str, error: WriteError) -> CaseResult:
 
 def _remove_unfinished(folder: Path) -> None:
     """Remove what a scenario that was ended has written; what an earlier run left stays."""
-    for file in (*folder.glob("*.part"), folder / "log.txt"):
+    for file in (*folder.glob("*.part"), folder / "log.txt") if not folder.is_symlink() else ():
         with contextlib.suppress(OSError):
             file.unlink(missing_ok=True)
 

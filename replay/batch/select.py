@@ -196,8 +196,9 @@ def _name_in(path: Path, taken: Collection[str]) -> str:
         found = _NAME_KEY.search(path.read_bytes())
     except OSError:
         found = None
-    numbered = (f"{path.stem}_{number}" for number in itertools.count(2))
-    names = itertools.chain([found[1].decode()] if found else [], [path.stem], numbered)
+    stem = path.stem.lstrip(".") or "scenario"  # the name of a folder, and no way to another one
+    numbered = (f"{stem}_{number}" for number in itertools.count(2))
+    names = itertools.chain([found[1].decode()] if found else [], [stem], numbered)
     return next(name for name in names if name not in taken)
 
 

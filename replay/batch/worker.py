@@ -179,7 +179,8 @@ def _throttled(answer: Callable[[object], None]) -> Follow:
 def _printing_to(log: Path | None) -> Iterator[None]:
     """Let everything that is printed go to a file, and to nowhere afterwards."""
     _flush()
-    target = os.open(os.devnull if log is None else log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)  # never through a link
+    target = os.open(os.devnull if log is None else log, flags, 0o666)
     for standard in (1, 2):
         os.dup2(target, standard)
     os.close(target)

@@ -11,6 +11,7 @@ import click
 from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import note
+from replay.cli.terminal import put
 from replay.cli.values import PathName
 
 
@@ -27,7 +28,7 @@ def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
     from replay.batch.accept import plan_acceptance
 
     plan = plan_acceptance(rundir, baseline)
-    click.echo("\n".join(plan.describe()))
+    put(plan.describe())
     if not plan.entries:
         return ExitCode.FINE
     if not yes and not sys.stdin.isatty():

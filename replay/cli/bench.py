@@ -44,6 +44,6 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
         paths = results.write(reports, output)  # after each, so that an interruption loses none
         note(f"bench {name}: {time.perf_counter() - begin:.0f} s")
     note(f"wrote {', '.join(map(str, paths))}")
-    say(form, lambda: results.as_text(reports), lambda: results.as_json(reports))
+    say(form, lambda: results.as_text(reports).splitlines(), lambda: results.as_json(reports))
     missed = any(goal.failed for report in reports for goal in report.goals)
     return ExitCode.DIFFERENT if missed else ExitCode.FINE

@@ -54,6 +54,6 @@ def calibrate(scenario: Path, curve: Path, filters: tuple[str, ...], output: Pat
     )
     plot = given["plot"] or output.with_suffix(".png")
     report.write(fit, output, plot, overwrite=given["overwrite"])
-    say(form, lambda: report.text(fit), lambda: report.as_json(fit))
+    say(form, lambda: report.text(fit).splitlines(), lambda: report.as_json(fit))
     note(f"wrote {output} and {plot}")
     return ExitCode.FINE

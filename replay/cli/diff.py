@@ -9,6 +9,7 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, say
+from replay.cli.terminal import put
 from replay.cli.values import PathName
 
 FILE = PathName()
@@ -43,7 +44,7 @@ def diff(
     """
     from replay.comparison.difference import Verdict
     from replay.comparison.outputs import Outputs
-    from replay.comparison.report_text import text
+    from replay.comparison.report_text import lines
     from replay.comparison.rules_file import read_rules
     from replay.comparison.runs import diff_runs
     from replay.comparison.suggest import suggest
@@ -53,8 +54,8 @@ def diff(
     found = diff_runs(baseline, candidate, rules=tolerances, strict_provenance=strict_provenance, visit=outputs.visit)
     outputs.write(found)
     if suggested:
-        click.echo(suggest(found), nl=False)
+        put(suggest(found).splitlines())
     else:
-        say(form, lambda: text(found, verbose=verbose).rstrip("\n"), found.as_json)
+        say(form, lambda: lines(found, verbose=verbose), found.as_json)
     codes = {Verdict.DIFFERENT: ExitCode.DIFFERENT, Verdict.UNREADABLE: ExitCode.INVALID}
     return codes.get(found.verdict, ExitCode.FINE)

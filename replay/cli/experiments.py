@@ -43,7 +43,7 @@ def experiments(names: tuple[str, ...], output: Path, scenarios: Path, overwrite
     shown = [table for table in tables if not table.name.endswith("_points")]
     say(
         form,
-        lambda: "\n\n".join(table.text() for table in shown),
+        lambda: "\n\n".join(table.text() for table in shown).splitlines(),
         lambda: {table.name: {"title": table.title, "rows": table.rows, "remarks": table.remarks} for table in tables},
     )
     note(f"wrote {', '.join(str(file) for file in files)}")

@@ -9,6 +9,7 @@ import click
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import note
+from replay.cli.terminal import put
 from replay.cli.values import PathName
 
 if TYPE_CHECKING:
@@ -42,8 +43,7 @@ def export(recording: Path, form: Format, output: Path | None, topics: tuple[str
         with McapLog(recording, salvage=True) as log:
             files = write(log, output or recording.parent, **how)
             lost = log.loss.reason if log.loss is not None else ""
-    for file in files:
-        click.echo(str(file))
+    put(map(str, files))
     if not lost:
         return ExitCode.FINE
     note(f"{recording}: {lost}")

@@ -24,7 +24,7 @@ def info(recording: Path, form: str) -> ExitCode:
     from replay.recording.summary import summarize
 
     found = summarize(recording, salvage=True)
-    say(form, found.as_text, found.as_json)
+    say(form, found.lines, found.as_json)
     if found.loss is None:
         return ExitCode.FINE
     note(f"{recording}: {found.loss_text}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import errno
 import importlib
-import io
 import os
 import sys
 import traceback
@@ -15,7 +14,7 @@ from typing import Any
 import click
 
 import replay
-from replay.cli import interruption
+from replay.cli import interruption, terminal
 from replay.cli.exit_codes import ExitCode
 from replay.errors import ReplayError
 
@@ -80,9 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     files and takes the viewer with it.
     """
     interruption.install()
-    for stream in (sys.stdout, sys.stderr):  # a name that the terminal cannot show is shown as escapes
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    terminal.install()
+    os.environ["PYTHONSAFEPATH"] = "1"  # no Python that is started from here imports from the current folder
     code = ExitCode.INTERRUPTED
     try:
         code = run(arguments)
@@ -105,17 +103,15 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
         context = error.ctx if isinstance(error, click.UsageError) else None
         hint = f"; see {context.command_path} --help" if context else ""
         message = " ".join(error.format_message().split()).rstrip(".")
-        click.echo(f"replay: error: {message}{hint}", err=True)
+        terminal.put([f"replay: error: {message}{hint}"], err=True)
         return ExitCode.INVALID
     except ReplayError as error:
         lines = str(error).splitlines()
-        for line in lines[:MAX_LINES]:
-            click.echo(f"replay: error: {line}", err=True)
-        if len(lines) > MAX_LINES:
-            click.echo(f"replay: error: ... and {len(lines) - MAX_LINES} more", err=True)
+        shown = [*lines[:MAX_LINES], *([f"... and {len(lines) - MAX_LINES} more"] if len(lines) > MAX_LINES else [])]
+        terminal.put([f"replay: error: {line}" for line in shown], err=True)
         return ExitCode.INVALID
     except (KeyboardInterrupt, click.Abort):
-        click.echo("replay: interrupted", err=True)
+        terminal.put(["replay: interrupted"], err=True)
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()  # nobody reads on; Python would complain about it at exit
@@ -124,7 +120,7 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
             return _fault(error)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left of the result would fail once more at exit
-        click.echo(f"replay: error: the result cannot be written to standard output: {error.strerror}", err=True)
+        terminal.put([f"replay: error: the result cannot be written to standard output: {error.strerror}"], err=True)
         return ExitCode.INVALID
     except Exception as error:  # Python's own exit code for it is 1, which here means "different"
         return _fault(error)
@@ -133,5 +129,5 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
 
 def _fault(error: Exception) -> ExitCode:
     traceback.print_exc()
-    click.echo(f"replay: error: this is a fault of replay: {type(error).__name__}: {error}", err=True)
+    terminal.put([f"replay: error: this is a fault of replay: {type(error).__name__}: {error}"], err=True)
     return ExitCode.FAILED

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from replay.cli.exit_codes import ExitCode
+from replay.cli.terminal import put
 from replay.cli.values import Memory, PathName, Seconds, ShardOf, Workers
 
 if TYPE_CHECKING:
@@ -73,14 +74,14 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
     return {"model": None if options["model"] is None else load_model(options["model"]), "execution": execution}
 
 
-def say(form: str, text: Callable[[], str], data: Callable[[], Any]) -> None:
-    """Write a result to stdout as text for people or as JSON for programs."""
-    click.echo(text() if form == "text" else json.dumps(data(), indent=1))
+def say(form: str, lines: Callable[[], Iterable[str]], data: Callable[[], Any]) -> None:
+    """Write a result to stdout as lines for people or as JSON for programs."""
+    put(lines() if form == "text" else json.dumps(data(), indent=1).splitlines())
 
 
 def note(message: str) -> None:
     """Write a remark to stderr, where it does not disturb results."""
-    click.echo(f"replay: {message}", err=True)
+    put([f"replay: {message}"], err=True)
 
 
 def note_left_out(paths: Sequence[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from replay.cli import interruption
+from replay.cli import interruption, terminal
+from replay.errors import printable
 from replay.numerics.compiling import Compiling
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ class RunProgress:
     """Counts scenarios done, failed and running, with rate and time left; use as a context."""
 
     def __init__(self) -> None:
-        self._console = Console(stderr=True, highlight=False)
+        self._console = Console(file=terminal.stderr_beneath(), stderr=True, highlight=False)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
         self._bars = Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
         self._all = self._bars.add_task("scenarios", total=None)
@@ -52,7 +54,8 @@ class RunProgress:
         """Show how far kernels are compiled; several workers tell, and what is done does not become less."""
         interruption.check()
         known = self._compiling or state
-        self._compiling = Compiling(max(known.done, state.done), known.total, max(known.seconds, state.seconds))
+        done, seconds = max(known.done, state.done), max(known.seconds, state.seconds)
+        self._compiling = Compiling(done, known.total, seconds, kept=known.kept and state.kept)
         if self._console.is_terminal:
             if self._kernels is None:
                 self._kernels = self._bars.add_task("compiling kernels", total=known.total)
@@ -66,13 +69,13 @@ class RunProgress:
         interruption.check()
         self._begin = self._begin or time.monotonic()  # kernels are ready now
         if self._compiling is not None:
-            self.tell(str(Compiling(self._compiling.total, self._compiling.total, self._compiling.seconds, ended=True)))
+            self.tell(str(dataclasses.replace(self._compiling, done=self._compiling.total, ended=True)))
             self._compiling = None
         if self._kernels is not None:
             self._bars.remove_task(self._kernels)
             self._kernels = None
         if name not in self._running:
-            self._running[name] = self._bars.add_task(f"  {escape(name)}", total=None)
+            self._running[name] = self._bars.add_task(f"  {escape(printable(name))}", total=None)
         if total:
             self._bars.update(self._running[name], completed=done, total=total)
         self._show()
@@ -94,7 +97,7 @@ class RunProgress:
     def compare(self, name: str) -> None:
         """Show which scenario is compared."""
         interruption.check()
-        self._bars.update(self._all, description=f"comparing {escape(name)}")
+        self._bars.update(self._all, description=f"comparing {escape(printable(name))}")
 
     def check(self) -> None:
         """Raise KeyboardInterrupt when the command was asked to stop."""
@@ -102,7 +105,7 @@ class RunProgress:
 
     def tell(self, text: str) -> None:
         """Say something above the bars."""
-        self._console.print(f"replay: {text}", markup=False, soft_wrap=True)
+        self._console.print(f"replay: {printable(text)}", markup=False, soft_wrap=True)
 
     def _show(self) -> None:
         counts = f"scenarios: {self._failed} failed, {len(self._running)} running{self._left()}"

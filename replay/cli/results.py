@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode, worst
 from replay.cli.options import say
+from replay.cli.terminal import put
 
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
@@ -21,15 +20,15 @@ def show(form: str, run: Run) -> None:
     """Write what became of each scenario, and where its recordings are; of several, how many there are of each end."""
     from replay.batch.case import describe
 
-    def text(result: CaseResult) -> str:
+    def text(result: CaseResult) -> list[str]:
         found = result.recordings
         paths = [f"  {path}" for path in (found.mcap, found.rrd) if path] if found else []
-        return "\n".join([*describe(result), *paths])
+        return [*describe(result), *paths]
 
     interruption.settle()
     say(
         form,
-        lambda: "\n".join([*map(text, run.results), *totals(run)]),
+        lambda: [*(line for result in run.results for line in text(result)), *totals(run)],
         lambda: [result.as_json() for result in run.results],
     )
 
@@ -63,7 +62,7 @@ def report(found: Regression, *, history: Path | None) -> ExitCode:
 
     interruption.settle()
     write_reports(found, history=history)
-    click.echo("\n".join([*describe(found), f"report: {found.run.directory / INDEX}"]))
+    put([*describe(found), f"report: {found.run.directory / INDEX}"])
     interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
     invalid = ExitCode.INVALID if any(result.invalid for result in found.run.results) else ExitCode.FINE
     return worst([interrupted, invalid, *(exit_code_of(item.verdict.name) for item in found.judged)])

@@ -52,5 +52,5 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
         note(f"note: {remark}")
     if problems:
         raise ScenarioError(problems)
-    say(form, lambda: "\n".join(lines), lambda: data)
+    say(form, lambda: lines, lambda: data)
     return ExitCode.FINE

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from replay.cli.exit_codes import ExitCode
+from replay.cli.terminal import put
 from replay.cli.values import PathName
 
 
@@ -39,5 +40,5 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
             show(file)
         else:
             picture(file, screenshot, at=at)
-            click.echo(str(screenshot))
+            put([str(screenshot)])
     return ExitCode.FINE

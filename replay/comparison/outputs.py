@@ -45,6 +45,6 @@ class Outputs:
             WriteError: a file cannot be written.
         """
         if self._html is not None:
-            write_file(self._html, report_html.html(found, self._drawn))
+            write_file(self._html, report_html.html(found, self._drawn), named=True)
         if self._junit is not None:
-            write_file(self._junit, report_junit.junit(found))
+            write_file(self._junit, report_junit.junit(found), named=True)

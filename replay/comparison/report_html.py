@@ -11,6 +11,7 @@ from replay.comparison import wording
 from replay.comparison.difference import Verdict
 from replay.comparison.plots import HEIGHT, LOWER, SHOWN, WIDTH, Plot
 from replay.comparison.runs import Case, RunDifference
+from replay.errors import printable
 
 
 def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
@@ -48,8 +49,19 @@ def draw(plot: Plot) -> Any:
 
 
 @cache
-def _template(name: str) -> Any:
+def template(package: str, name: str) -> Any:
+    """Return a page's template; whatever is put into it is escaped for HTML, and control characters are shown."""
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    return environment.from_string(resources.files("replay.comparison").joinpath(name).read_text(encoding="utf-8"))
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined, finalize=_shown
+    )
+    return environment.from_string(resources.files(package).joinpath(name).read_text(encoding="utf-8"))
+
+
+def _shown(value: object) -> object:
+    return value if hasattr(value, "__html__") else printable(str(value), keep="\n\t")
+
+
+def _template(name: str) -> Any:
+    return template("replay.comparison", name)

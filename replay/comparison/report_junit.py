@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from xml.etree import ElementTree
 
 from replay.comparison import wording
 from replay.comparison.difference import Verdict
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, RunDifference
+from replay.errors import printable
 
 SUITE = "replay diff"
-
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit(found: RunDifference) -> bytes:
@@ -52,15 +50,15 @@ def _details(found: RunDifference, case: Case) -> str:
 
 
 def _case(suite: ElementTree.Element, name: str) -> ElementTree.Element:
-    attributes = {"name": _clean(name), "classname": SUITE, "time": "0"}
+    attributes = {"name": clean(name), "classname": SUITE, "time": "0"}
     return ElementTree.SubElement(suite, "testcase", attributes)
 
 
 def _child(element: ElementTree.Element, tag: str, content: str, **attributes: str) -> None:
-    child = ElementTree.SubElement(element, tag, {key: _clean(value) for key, value in attributes.items()})
-    child.text = _clean(content)
+    child = ElementTree.SubElement(element, tag, {key: clean(value) for key, value in attributes.items()})
+    child.text = clean(content)
 
 
-def _clean(value: str) -> str:
-    """Return text without the characters that XML cannot hold, not even escaped."""
-    return _NOT_XML.sub("�", value)
+def clean(value: str) -> str:
+    """Return text for XML, which cannot hold most control characters, not even escaped; lines stay lines."""
+    return printable(value, keep="\n\t")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from replay.comparison import wording
 from replay.comparison.difference import Change, Difference, SignalDifference, Verdict
 from replay.comparison.runs import Case, RunDifference
-from replay.errors import count
+from replay.errors import count, printable
 
 SHOWN_SIGNALS = 12
 """Signals of a scenario in the short form."""
@@ -15,10 +15,11 @@ SHOWN_SIGNALS = 12
 
 def text(found: RunDifference, *, verbose: bool = False) -> str:
     """Return the report, ending in a newline; control characters in names are written as escapes."""
-    return "".join(f"{_printable(line)}\n" for line in _lines(found, verbose))
+    return "".join(f"{printable(line)}\n" for line in lines(found, verbose=verbose))
 
 
-def _lines(found: RunDifference, verbose: bool) -> Iterator[str]:
+def lines(found: RunDifference, *, verbose: bool = False) -> Iterator[str]:
+    """Yield the lines of the report, with names as they are."""
     alone = [*found.missing, *found.extra]
     several = len(found.cases) + len(found.unreadable) + len(alone) > 1
     above: tuple[Change, ...] = ()
@@ -72,7 +73,3 @@ def _details(item: SignalDifference, found: Difference, verbose: bool) -> Iterat
         yield wording.rule(item.rule)
     elif item.rule is not None:
         yield f"rule {wording.tolerance(item.rule)}"
-
-
-def _printable(line: str) -> str:
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)

@@ -14,6 +14,8 @@ from pydantic import (
     ConfigDict,
     StrictBool,
     StringConstraints,
+    TypeAdapter,
+    ValidationError,
     create_model,
     model_validator,
 )
@@ -72,6 +74,16 @@ def _fits_file_systems(title: str) -> str:
 
 Title = Annotated[str, StringConstraints(pattern=_TITLE, max_length=100), AfterValidator(_fits_file_systems)]
 """Name of a scenario; it becomes the name of a folder and of files."""
+
+
+def is_title(name: str) -> bool:
+    """Return whether a scenario can have a name, which then is that of its folder and no way to another one."""
+    try:
+        TypeAdapter(Title).validate_python(name)
+    except ValidationError:
+        return False
+    return True
+
 
 Text = Annotated[str, StringConstraints(max_length=10_000)]
 Glob = Annotated[str, StringConstraints(min_length=1, max_length=200)]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError
 
@@ -89,17 +90,22 @@ class PartFile:
             self.part.unlink(missing_ok=True)
 
 
-def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path:
+def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: bool = False) -> Path:
     """Write a whole file and the folders that it needs, or leave what was there; return its path.
 
-    Devices, pipes and links, such as /dev/stdout, are written in place: a new file would take their name from them.
+    Args:
+        path: of the file; a link of that name is replaced by the file, and what it leads to stays as it is.
+        data: content.
+        overwrite: replace what is there.
+        named: the user named this very file. Then devices, pipes and links, such as /dev/stdout, are written in place:
+            a new file would take their name from them.
 
     Raises:
         RecordingExistsError: the file exists and `overwrite` is false.
         WriteError: it cannot be written.
     """
     data = data.encode() if isinstance(data, str) else data
-    if overwrite and (path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())):
+    if overwrite and named and (path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())):
         try:
             path.write_bytes(data)
         except OSError as error:
@@ -115,8 +121,15 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True) -> Path
     return path
 
 
-def append_lines(path: Path, lines: Iterable[str]) -> None:
-    """Append lines to a text file and make the folders that it needs; all of them or, with a WriteError, none."""
+def append_lines(path: Path, lines: Iterable[str], *, named: bool = False) -> None:
+    """Append lines to a text file and make the folders that it needs; all of them or, with a WriteError, none.
+
+    A file that has other names (hard links) loses them first. A link is refused, unless the user `named` it.
+    """
+    if not named:
+        refuse_link(path)
+    if not named and path.is_file() and path.stat().st_nlink > 1:
+        write_file(path, path.read_bytes())
     data = memoryview("".join(f"{line}\n" for line in lines).encode())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -130,6 +143,24 @@ def append_lines(path: Path, lines: Iterable[str]) -> None:
                 raise
     except OSError as error:
         raise write_error(path, error) from None
+
+
+def refuse_link(path: Path) -> None:
+    """Refuse a place in a folder of results that is a link: what would be written or deleted there is elsewhere.
+
+    The folder itself may be reached through links: the user has named it.
+
+    Raises:
+        WriteError: it is one.
+    """
+    if path.is_symlink():
+        raise WriteError(str(path), "it is a link, and nothing is written through links here; remove it")
+
+
+def json_line(value: Any) -> str:
+    """Return JSON on one line, in which only characters that show nothing are escaped."""
+    text = json.dumps(value, ensure_ascii=False)
+    return text if text.isprintable() else "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in text)
 
 
 def write_error(path: Path, error: OSError | UnicodeEncodeError) -> WriteError:

@@ -13,14 +13,17 @@ class Compiling:
         done, total: kernels compiled, and all that are wanted.
         seconds: since the first of them was begun.
         ended: nothing is left to compile for now.
+        kept: the next run finds them compiled.
     """
 
     done: int
     total: int
     seconds: float
     ended: bool = False
+    kept: bool = True
 
     def __str__(self) -> str:
         if self.ended:
-            return f"compiled {self.done} kernel{'s' * (self.done != 1)} in {self.seconds:.1f} s; they are kept"
+            kept = "; they are kept" if self.kept else ""
+            return f"compiled {self.done} kernel{'s' * (self.done != 1)} in {self.seconds:.1f} s{kept}"
         return f"compiling kernels: {self.done} of {self.total}, {self.seconds:.0f} s"

@@ -65,7 +65,7 @@ def picture(
             time.sleep(_PAUSE)
             with contextlib.suppress(TimeoutError):  # the library gives a picture 15 s, a busy machine may need more
                 before, now = now or b"", viewer.take_screenshot()
-    write_file(png, now)
+    write_file(png, now, named=True)
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ from replay.numerics.columns import Field
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import read_events
 from replay.recording.events import Events
-from replay.recording.provenance import RECORD, Provenance
+from replay.recording.provenance import RECORD, Provenance, sha256
 from replay.sensing.kinds import KINDS, of_kind
 from replay.simulation import Layout
 
@@ -121,6 +121,24 @@ def read_provenance(log: McapLog) -> Provenance:
     return Provenance.from_metadata(str(log.path), found[0])
 
 
+def read_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
+    """Return the files that are attached to an opened recording, by name: those that its provenance states.
+
+    Raises:
+        RecordingError: one is not the file whose SHA-256 is stated, so the readings may be of another scene.
+    """
+    files = {}
+    for attachment in log.attachments:
+        if attachment.name not in provenance.files:
+            continue  # of a tool of others
+        data = log.attachment(attachment)
+        if sha256(data) != provenance.files[attachment.name]:
+            rule = f"damaged: the attached {attachment.name!r} is not the file whose SHA-256 its metadata states"
+            raise RecordingError(str(log.path), rule)
+        files[attachment.name] = data
+    return files
+
+
 def own_topics(layout: Layout) -> set[str]:
     """Return the topics that a recording may have; those that another tool has added to it are none of them."""
     return {FRAMES, "/tf", "/scene", EVENTS, "/collision", *layout.topics()}
@@ -175,7 +193,7 @@ class _Assembly:
             collision=self._collision(),
             readings=self._readings(),
             events=self._events(),
-            files={entry.name: self._log.attachment(entry) for entry in self._log.attachments},
+            files=read_files(self._log, self._provenance),
             loss=self._log.loss,
             lost_frames=self._provenance.frames - count,
         )

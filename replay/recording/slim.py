@@ -6,6 +6,7 @@ message; only the attachments that are no text are missing, and its provenance s
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
@@ -19,20 +20,21 @@ from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Chunk, Op
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import UNFINISHED, PartFile, write_file
-from replay.recording.provenance import sha256
-from replay.recording.reader import read_provenance
+from replay.recording.provenance import Provenance, sha256
+from replay.recording.reader import read_files, read_provenance
 
 OBJECTS = "objects"
 """Name of the folder that holds the files of slim recordings by SHA-256; it stands above them."""
 
 _TEXTS = (".yaml", ".yml")
+_DIGEST = re.compile("[0-9a-f]{64}")
 
 
 def write_slim(recording: Path, target: Path, objects: Path) -> tuple[str, ...]:
     """Write a recording without its meshes, and the meshes by their digests.
 
     Args:
-        recording: a whole recording.
+        recording: a whole recording: every file that its provenance states is attached, or in a folder of objects.
         target: the slim one; replaced when it exists.
         objects: folder for the meshes; one that is there already stays, unless it is damaged.
 
@@ -40,21 +42,22 @@ def write_slim(recording: Path, target: Path, objects: Path) -> tuple[str, ...]:
         The digests of the meshes that the recording needs.
 
     Raises:
-        RecordingError: the recording cannot be read.
+        RecordingError: the recording cannot be read, or lacks a file or has another one than it states.
         WriteError: a file cannot be written.
     """
     needed = []
     with McapLog(recording) as log:
+        files = _all_files(log, read_provenance(log))
         file = PartFile(target, overwrite=True)
         try:
             writer = McapFileWriter(file, log.library)
             for name, values in log.metadata:
                 if name != PREAMBLE:
                     writer.metadata(name, values)
-            for attachment in log.attachments:
-                data = log.attachment(attachment)
-                if PurePosixPath(attachment.name).suffix.lower() in _TEXTS:
-                    writer.attachment(attachment.name, attachment.media_type, data)
+            kinds = {attachment.name: attachment.media_type for attachment in log.attachments}
+            for name, data in files.items():
+                if PurePosixPath(name).suffix.lower() in _TEXTS:
+                    writer.attachment(name, kinds.get(name, ""), data)
                 else:
                     needed.append(_put(data, objects))
             schemas = {number: writer.schema(schema) for number, schema in sorted(log.schemas.items())}
@@ -87,22 +90,33 @@ def attached_files(recording: Path) -> tuple[str, str, dict[str, bytes]]:
         if log.loss is not None and not log.preamble_holds:
             raise RecordingError(str(recording), f"nothing can be salvaged: {log.loss.reason}")
         provenance = read_provenance(log)
-        files = {attachment.name: log.attachment(attachment) for attachment in log.attachments}
+        return provenance.scenario, provenance.root, _all_files(log, provenance)
+
+
+def is_digest(name: str) -> bool:
+    """Return whether a name is one that files in `OBJECTS` have."""
+    return _DIGEST.fullmatch(name) is not None
+
+
+def _all_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
+    files = read_files(log, provenance)
     for name, digest in provenance.files.items():
         if name not in files:
-            files[name] = _object(recording, name, digest)
-    return provenance.scenario, provenance.root, files
+            files[name] = _object(log.path, name, digest)
+    return files
 
 
 def _put(data: bytes, objects: Path) -> str:
     digest = sha256(data)
     place = objects / digest
-    if not place.is_file() or place.read_bytes() != data:
+    if place.is_symlink() or not place.is_file() or place.read_bytes() != data:
         write_file(place, data)
     return digest
 
 
 def _object(recording: Path, name: str, digest: str) -> bytes:
+    if not is_digest(digest):
+        raise RecordingError(str(recording), f"damaged: what its metadata states of {name!r} is no SHA-256")
     places = [folder / OBJECTS / digest for folder in recording.absolute().parents]
     place = next((place for place in places if place.is_file()), None)
     if place is None:

@@ -68,7 +68,7 @@ class Summary:
         provenance = None if made is None else asdict(made) | {"layout": asdict(made.layout)}
         return asdict(self) | {"path": str(self.path), "provenance": provenance}
 
-    def as_text(self) -> str:
+    def lines(self) -> list[str]:
         """Return the summary as lines for people."""
         width = max((len(topic.topic) for topic in self.topics), default=0)
         topics = (f"  {t.topic:<{width}}  {t.messages:>7}  {t.schema or '(no schema)'}" for t in self.topics)
@@ -78,8 +78,8 @@ class Summary:
             messages = count(sum(topic.messages for topic in self.topics), "message")
             lines = [f"{self.path}: {messages}, {head}, written by {self.library}", *self._span(), "topics", *topics]
             lines += [*self._joints(), *(["files"] if self.files else [])]
-            return "\n".join([*lines, *(f"  {size:>9}  {name}" for name, size in sorted(self.files.items()))])
-        lines = [
+            return [*lines, *(f"  {size:>9}  {name}" for name, size in sorted(self.files.items()))]
+        return [
             f"{self.path}: {made.scenario}, {count(self.frames, 'frame')}, {head}",
             "topics",
             *topics,
@@ -93,7 +93,6 @@ class Summary:
                 for name, sha in sorted(made.files.items())
             ),
         ]
-        return "\n".join(lines)
 
     def _span(self) -> Iterator[str]:
         if self.begin is None or self.end is None:

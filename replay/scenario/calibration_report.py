@@ -83,8 +83,8 @@ def write(fit: CurveFit, sensor: Path, drawing: Path, *, overwrite: bool) -> Non
     for path in (sensor, drawing):
         if path.exists() and not overwrite:
             raise RecordingExistsError(str(path))
-    draw(drawing, panels(fit), overwrite=overwrite)
-    write_file(sensor, sensor_file(fit).encode(), overwrite=overwrite)
+    draw(drawing, panels(fit), overwrite=overwrite, named=True)
+    write_file(sensor, sensor_file(fit).encode(), overwrite=overwrite, named=True)
 
 
 def panels(fit: CurveFit) -> list[Panel]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from replay.errors import printable
 from replay.logs.part_file import write_file
 
 PANEL_INCHES = (5.2, 3.9)
@@ -38,13 +39,24 @@ class Panel:
     logarithmic: bool = False
 
 
-def draw(path: Path, panels: Sequence[Panel], *, columns: int = 2, overwrite: bool = False) -> None:
-    """Write panels as one PNG.
+def draw(
+    path: Path, panels: Sequence[Panel], *, columns: int = 2, overwrite: bool = False, named: bool = False
+) -> None:
+    """Write panels as one PNG; `overwrite` and `named` as of `write_file`.
 
     Raises:
         RecordingExistsError: the file exists and `overwrite` is false.
         WriteError: the file cannot be written.
     """
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # not the settings in a matplotlibrc of the current folder, or of the user
+        picture = _picture(panels, columns)
+    write_file(path, picture, overwrite=overwrite, named=named)
+
+
+def _picture(panels: Sequence[Panel], columns: int) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -56,15 +68,20 @@ def draw(path: Path, panels: Sequence[Panel], *, columns: int = 2, overwrite: bo
     for panel, axis in zip(panels, axes, strict=False):
         for line in panel.lines:
             style = {"marker": "o", "linestyle": "none"} if line.points else {"linestyle": "-", "linewidth": 1.5}
-            axis.plot(line.x, line.y, label=line.label, color=_COLORS[line.color % len(_COLORS)], **style)
+            axis.plot(line.x, line.y, label=_plain(line.label), color=_COLORS[line.color % len(_COLORS)], **style)
         if panel.logarithmic:
             axis.set_xscale("log")
             axis.set_yscale("log")
-        axis.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
+        axis.set(title=_plain(panel.title), xlabel=_plain(panel.x), ylabel=_plain(panel.y))
         axis.grid(visible=True, alpha=0.3)
         axis.legend(fontsize="small")
     for axis in axes[len(panels) :]:
         axis.set_visible(False)
     picture = BytesIO()
     figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
-    write_file(path, picture.getvalue(), overwrite=overwrite)
+    return picture.getvalue()
+
+
+def _plain(text: str) -> str:
+    """Return text of others for a drawing, in which dollars would begin a formula."""
+    return printable(text).replace("$", r"\$")

@@ -53,7 +53,7 @@ def test_slim_recordings_share_their_meshes_and_say_all_that_the_whole_ones_do(r
     assert mesh.read_bytes() == (run / "ball.stl").read_bytes()
     slim, whole = baseline.recording("a"), run / "a" / "a.mcap"
     assert slim.stat().st_size < whole.stat().st_size - mesh.stat().st_size
-    assert "  elsewhere  ball.stl" in summarize(slim).as_text()
+    assert any(line.endswith("  elsewhere  ball.stl") for line in summarize(slim).lines())
     found = diff(slim, whole)
     assert found.verdict.value == "same"
     assert not found.provenance

@@ -18,6 +18,7 @@ from replay.batch.prepare import needs_of
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, NoSpaceError, RecordingExistsError
+from replay.logs.part_file import write_file
 from replay.scenario.methods import BUILTIN_MODELS, Model
 from tests.batch import scenes
 
@@ -182,10 +183,13 @@ def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
     assert (again.status, again.recordings) == (Status.FAILED, None)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
-def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path):
-    (tmp_path / "good").mkdir()
-    (tmp_path / "good" / "result.json").symlink_to("/dev/full")
+def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path, monkeypatch):
+    def full(path, data):
+        if path.name == "result.json":
+            raise NoSpaceError(str(path), "No space left on device")
+        return write_file(path, data)
+
+    monkeypatch.setattr("replay.batch.run.write_file", full)
     with pytest.raises(NoSpaceError):
         run_all([scenes.scene("good"), scenes.scene("other")], tmp_path, rrd=False, execution=TWO)
     assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True

@@ -1,10 +1,12 @@
 """A made-up recording and one in which a little of everything has changed."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 
 from replay.comparison.runs import Case, Pair, RunDifference, diff_pair
+from replay.recording.provenance import sha256
 from tests.comparison import made_up
 
 BASELINE = made_up.recording()
@@ -20,10 +22,11 @@ def change(recording):
     recording.collision.clearance[20:22, 0] = np.nan
 
 
+BEAM = b"hollow beam"
 CANDIDATE = made_up.with_provenance(
-    made_up.altered(BASELINE, change),
+    dataclasses.replace(made_up.altered(BASELINE, change), files={**BASELINE.files, "meshes/beam.stl": BEAM}),
     libraries={**BASELINE.provenance.libraries, "numpy": "9.9"},
-    files={**BASELINE.provenance.files, "meshes/beam.stl": "f" * 64},
+    files={**BASELINE.provenance.files, "meshes/beam.stl": sha256(BEAM)},
 )
 
 

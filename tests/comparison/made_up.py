@@ -128,8 +128,8 @@ def only_frames(original: Recording, frames: Any) -> Recording:
     )
 
 
-def write(made: Recording, path: Path, *, files: Mapping[str, bytes] = FILES, size: float = 1.0) -> Path:
-    """Write a recording as a file; its bodies have triangles of a size."""
+def write(made: Recording, path: Path, *, files: Mapping[str, bytes] | None = None, size: float = 1.0) -> Path:
+    """Write a recording as a file, with its own files or others; its bodies have triangles of a size."""
     shapes = made.layout.shapes
     bodies = tuple(
         BodyView(shape, made.layout.links.index(shape.split("/")[0]), size * TRIANGLES, (200, 200, 210, 255))
@@ -138,7 +138,7 @@ def write(made: Recording, path: Path, *, files: Mapping[str, bytes] = FILES, si
     scene = SceneView(made.provenance.scenario, "", made.layout.links, bodies, (), {})
     path.parent.mkdir(parents=True, exist_ok=True)
     provenance: Provenance = made.provenance
-    writer = McapWriter(path, provenance, scene, files, overwrite=True)
+    writer = McapWriter(path, provenance, scene, made.files if files is None else files, overwrite=True)
     for first in range(0, len(made.time), BLOCK_FRAMES):
         rows = slice(first, first + BLOCK_FRAMES)
         part = only_frames(made, rows)

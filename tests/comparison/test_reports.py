@@ -26,8 +26,9 @@ from tests.comparison import made_up
 from tests.comparison.changed import BASELINE, CANDIDATE, compared
 
 PAIR = "arm/beam|stand/base"
-DIGEST = BASELINE.provenance.files["meshes/beam.stl"]
-HOSTILE = "<script>alert(1)</script>\x07&'\""
+DIGEST, OTHER = (made.provenance.files["meshes/beam.stl"] for made in (BASELINE, CANDIDATE))
+HOSTILE = "<script>alert(1)</script>\x07\x1b[2J\x9b\u202e\udcff&'\""
+SHOWN = "<script>alert(1)</script>\\x07\\x1b[2J\\x9b\\u202e\\udcff&'\""
 
 
 def test_text_is_short_and_says_where_and_how_much():
@@ -38,7 +39,7 @@ def test_text_is_short_and_says_where_and_how_much():
         "  provenance (does not decide)",
         f"    libraries.numpy: {np.__version__} -> 9.9",
         "  scene",
-        f"    /files/meshes/beam.stl: sha256 {DIGEST[:12]}... -> sha256 ffffffffffff...",
+        f"    /files/meshes/beam.stl: sha256 {DIGEST[:12]}... -> sha256 {OTHER[:12]}...",
         f"  changed: /collision/evaluated/{PAIR}",
         "    1 event shifted; 2 of 100 frames differ",
         "    evaluation of the clearance begins 2 frames later (+33.33 ms): "
@@ -128,11 +129,12 @@ def test_json_holds_all_of_it_and_is_json():
 
 def test_names_cannot_escape_from_a_report():
     found, pair = compared(HOSTILE)
-    assert "\x07" not in text(found)
+    assert SHOWN in text(found)
     root = ElementTree.fromstring(junit(found))
-    assert root.find("testsuite/testcase").get("name") == HOSTILE.replace("\x07", "�")
+    assert root.find("testsuite/testcase").get("name") == SHOWN
     page = html(found, {HOSTILE: plots(found.cases[0].difference, pair)})
     assert "<script" not in page.lower()
+    assert page.replace("\n", "").isprintable()
     assert "&lt;script&gt;alert(1)" in page
 
 

@@ -19,6 +19,7 @@ def rewritten(
     order: Order = "log time",
     seed: int = 1,
     extra: Mapping[str, bytes] | None = None,
+    attached: Mapping[str, bytes] | None = None,
     **options: Any,
 ) -> bytes:
     """Return a recording as the library writes it.
@@ -28,6 +29,7 @@ def rewritten(
         order: of the messages.
         seed: for shuffling.
         extra: messages of a tool of its own, by topic, without a schema.
+        attached: other content of attachments, by name, also of new ones.
         options: of `mcap.writer.Writer`.
     """
     reader = make_reader(io.BytesIO(recording))
@@ -35,10 +37,12 @@ def rewritten(
     writer = Writer(out, **options)
     header = reader.get_header()
     writer.start(header.profile, header.library)
-    for attachment in reversed(list(reader.iter_attachments())):
-        writer.add_attachment(
-            attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
-        )
+    more = dict(attached or {})
+    for found in reversed(list(reader.iter_attachments())):
+        data = more.pop(found.name, found.data)
+        writer.add_attachment(found.create_time, found.log_time, found.name, found.media_type, data)
+    for name, data in more.items():
+        writer.add_attachment(0, 0, name, "", data)
     messages = list(reader.iter_messages())
     if order == "reversed":
         messages.reverse()

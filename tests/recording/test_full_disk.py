@@ -6,6 +6,7 @@ The system refuses to let a file of this process grow beyond a limit (RLIMIT_FSI
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import resource
 import signal
@@ -15,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from replay.errors import RecordingExistsError, WriteError
-from replay.logs.part_file import append_lines, write_file
+from replay.logs.part_file import append_lines, json_line, write_file
 from replay.recording.behind import WriteBehind, Writer
 from replay.recording.export import FORMATS, export
 from replay.recording.reader import read
@@ -101,15 +102,40 @@ def test_lines_are_appended_all_or_none(tmp_path: Path) -> None:
     assert log.read_text(encoding="utf-8") == "one\nzwei ä\nthree\n"
 
 
-def test_links_and_devices_are_written_in_place(tmp_path: Path) -> None:
+def test_links_and_devices_that_the_user_names_are_written_in_place(tmp_path: Path) -> None:
     (tmp_path / "report").write_text("before")
     (tmp_path / "link").symlink_to(tmp_path / "report")
-    assert write_file(tmp_path / "link", "after").is_symlink()
-    assert (tmp_path / "report").read_text() == "after"
+    assert write_file(tmp_path / "link", "after", named=True).is_symlink()
+    append_lines(tmp_path / "link", ["more"], named=True)
+    assert (tmp_path / "report").read_text() == "aftermore\n"
     (tmp_path / "full").symlink_to("/dev/full")
     with pytest.raises(WriteError, match="No space left"):
-        write_file(tmp_path / "full", "x")
+        write_file(tmp_path / "full", "x", named=True)
     assert (tmp_path / "full").is_symlink()
+
+
+def test_other_links_are_replaced_or_refused_and_never_written_through(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("precious")
+    for name in ("link", "lines"):
+        (tmp_path / name).symlink_to(tmp_path / "kept")
+    (tmp_path / "pipe").symlink_to("/dev/full")
+    for name in ("link", "pipe"):
+        assert not write_file(tmp_path / name, "new").is_symlink()
+        assert (tmp_path / name).read_text() == "new"
+    with pytest.raises(WriteError, match="it is a link, and nothing is written through links here"):
+        append_lines(tmp_path / "lines", ["more"])
+    (tmp_path / "other").hardlink_to(tmp_path / "kept")
+    append_lines(tmp_path / "other", ["!"])
+    assert (tmp_path / "other").read_text() == "precious!\n"
+    assert (tmp_path / "kept").read_text() == "precious"
+
+
+def test_lines_of_json_hold_no_character_that_shows_nothing(tmp_path: Path) -> None:
+    value = {"näher": "a\u202eb\x9bc\x7f\udcff\U000e0001d", "is": ["fine", "ß"]}
+    text = json_line(value)
+    assert json.loads(text) == value
+    assert text.isprintable()
+    assert "näher" in text
 
 
 def test_an_unfinished_file_is_replaced_whatever_has_its_name(tmp_path: Path) -> None:

@@ -209,10 +209,10 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         try:
             with event.trigger_event("numba:compile", data=details), _lowering():
                 result = self._wrapped(self._lower(arguments))
+            store.save(name, key, serialize.dumps(result._reduce()))
         finally:
             counted.end()
         self._cache_misses[arguments] += 1
-        store.save(name, key, serialize.dumps(result._reduce()))
         return result
 
     def _wrapped(self, lowered: Any) -> Any:

@@ -84,7 +84,7 @@ def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: 
     missing = [entry for entry in entries if compiler.AVAILABLE and not entry.is_ready]
     if missing:
         missing.sort(key=lambda entry: -entry.size)
-        if len(missing) > 1:
+        if len(missing) > 1 and store.directory() is not None:
             share()
         _compile(missing)
     for each in entries:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import os
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +13,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import config
 
-from replay.numerics.jit import compiler, store
+from replay.numerics.jit import compiler, progress, store
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -20,6 +22,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "forceinline": False}
 
 _settings: Any = config  # numba fills this module at run time
+if hasattr(_settings, "_config_fname"):
+    # numba takes settings from a .numba_config.yaml too, if one lies in the folder that a command is called in; what a
+    # kernel computes, and whether it is compiled, is none of that folder's business
+    _settings._config_fname = os.devnull
+    _settings.reload_config()
 
 
 def kernel(function: Function) -> Function:
@@ -60,24 +67,56 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     if compiler.AVAILABLE:
         wanted = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return compiler.KernelDispatcher(function, targetoptions={**wanted, **_OPTIONS, **options})
-    previous = _settings.CACHE_DIR
-    _settings.CACHE_DIR = str(_numbas_own_cache())
-    try:
-        dispatcher = numba.njit(cache=True, **_OPTIONS)(function)
-    finally:
-        _settings.CACHE_DIR = previous
+    folder, previous = _numbas_own_cache(), _settings.CACHE_DIR
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    if folder is not None:
+        _settings.CACHE_DIR = str(folder)
+        try:
+            dispatcher.enable_caching()
+        finally:
+            _settings.CACHE_DIR = previous
+        dispatcher._cache = _Lenient(dispatcher._cache)
     dispatcher.targetoptions.update(options)
     return dispatcher
 
 
+class _Lenient:
+    """numba's own cache of a function; what cannot be read in it is removed, and what cannot be written is not kept."""
+
+    def __init__(self, cache: Any) -> None:
+        self._cache = cache
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is kept, or None."""
+        try:
+            return self._cache.load_overload(sig, target_context)
+        except Exception:  # whatever unpickling half a file raises
+            with contextlib.suppress(OSError):
+                self._cache.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function."""
+        try:
+            self._cache.save_overload(sig, data)
+        except Exception as error:
+            progress.unkept(str(error))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
+
+
 @lru_cache(maxsize=1)
-def _numbas_own_cache() -> Path:
+def _numbas_own_cache() -> Path | None:
     """Return a folder for numba's own cache: it looks at one file only, so the folder is named by all sources."""
+    folder = store.directory()
+    if folder is None:
+        return None
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parents[2]
     for source in sorted(package.rglob("*.py")):
         digest.update(source.relative_to(package).as_posix().encode() + b"\0" + source.read_bytes())
-    return store.directory() / f"plain-{digest.hexdigest()[:20]}"
+    return folder / f"plain-{digest.hexdigest()[:20]}"
 
 
 @lru_cache(maxsize=1)

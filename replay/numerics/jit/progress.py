@@ -72,7 +72,8 @@ class Progress(event.Listener):  # type: ignore[misc]
 
     def _now(self, *, ended: bool = False) -> Compiling:
         done = self._done + self._elsewhere()
-        return Compiling(done if ended else min(done, self._total), self._total, time.monotonic() - self._begin, ended)
+        seconds = time.monotonic() - self._begin
+        return Compiling(done if ended else min(done, self._total), self._total, seconds, ended, not _unkept.is_set())
 
     def _watch(self, told: threading.Event, ended: threading.Event) -> None:
         if ended.wait(self._patience):
@@ -94,13 +95,15 @@ class OnStderr:
         now = time.monotonic()
         with contextlib.suppress(OSError, ValueError, AttributeError):  # closed meanwhile, or none at all
             if sys.stderr.isatty():
-                print(f"\r\x1b[Kreplay: {state}", end="\n" if state.ended else "", file=sys.stderr, flush=True)
+                terminal = getattr(sys.stderr, "beneath", sys.stderr)  # the command writes escapes as text; see cli
+                print(f"\r\x1b[Kreplay: {state}", end="\n" if state.ended else "", file=terminal, flush=True)
             elif state.ended or now >= self._next:
                 self._next = now + _LINES
                 print(f"replay: {state}", file=sys.stderr, flush=True)
 
 
 _said: set[str] = set()
+_unkept = threading.Event()
 
 
 def _print_remark(text: str) -> None:
@@ -129,3 +132,9 @@ def remark(text: str) -> None:
     if text not in _said:
         _said.add(text)
         _remark(text)
+
+
+def unkept(reason: str) -> None:
+    """Say that kernels are compiled and cannot be kept."""
+    _unkept.set()
+    remark(f"compiled kernels cannot be kept: {reason}; the next run compiles them again")

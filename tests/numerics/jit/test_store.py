@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import os
+import re
 import signal
 import subprocess
 import time
@@ -156,3 +157,126 @@ def test_a_claim_is_one_process_at_a_time(folder):
         assert store.is_claimed("a", "k")
         assert not store.is_claimed("b", "k")
     assert not store.is_claimed("a", "k")
+
+
+@pytest.mark.parametrize("place", ["a folder", "a link", "a pipe", "a device"])
+def test_what_stands_in_a_kernels_place_is_not_read_and_makes_room(folder, tmp_path_factory, place):
+    store.save("a.b-1", "0" * 32, b"payload")
+    (file,) = folder.iterdir()
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "kernel"
+    file.rename(elsewhere)
+    match place:
+        case "a folder":
+            (file / "sub").mkdir(parents=True)
+        case "a link":
+            file.symlink_to(elsewhere)
+        case "a pipe":
+            os.mkfifo(file)  # whoever opens it waits for a writer
+        case "a device":
+            file.symlink_to("/dev/zero")
+    assert store.load("a.b-1", "0" * 32) is None
+    store.save("a.b-1", "0" * 32, b"payload")
+    assert store.load("a.b-1", "0" * 32) == b"payload"
+    assert elsewhere.exists()
+
+
+@pytest.mark.skipif(os.name != "posix" or os.getuid() != 0, reason="only root can give files to others")
+def test_another_users_file_is_not_read(folder):
+    store.save("a.b-1", "0" * 32, b"payload")
+    (file,) = folder.iterdir()
+    os.chown(file, 5555, -1)
+    assert store.load("a.b-1", "0" * 32) is None
+
+
+@pytest.mark.skipif(os.name != "posix", reason="owners and modes are a matter of POSIX")
+def test_who_may_write_decides_over_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "_is_private", lambda group: group == 7001)
+    said = {}
+    for name, mode, group in (
+        ("own", 0o700, 0),
+        ("seen", 0o755, 7000),
+        ("all", 0o777, 0),
+        ("sticky", 0o1777, 0),
+        ("group", 0o770, 7000),
+        ("private", 0o770, 7001),
+    ):
+        (tmp_path / name).mkdir()
+        if os.getuid() == 0:
+            os.chown(tmp_path / name, -1, group)
+        (tmp_path / name).chmod(mode)
+        said[name] = store._who_else_writes(tmp_path / name)
+        if said[name] is None:
+            assert (tmp_path / name).stat().st_mode & 0o777 == 0o700
+    refused = {name for name, reason in said.items() if reason == "others can write to it"}
+    assert refused == {"all", "sticky", *(["group"] if os.getuid() == 0 else [])}
+    assert {said[name] for name in said.keys() - refused} == {None}
+    (tmp_path / "sticky" / "mine").mkdir(mode=0o700)
+    (tmp_path / "all" / "mine").mkdir(mode=0o700)
+    assert store._who_else_writes(tmp_path / "sticky" / "mine") is None
+    assert store._who_else_writes(tmp_path / "all" / "mine") == f"others can write to {tmp_path / 'all'}"
+
+
+def test_a_group_that_nobody_knows_is_not_private():
+    assert not store._is_private(2**31 - 5)
+
+
+def remarks(said):
+    """Return what was said on stderr but for the progress, which a slow machine tells and a fast one does not."""
+    assert "they are kept" not in said
+    return [line for line in said.splitlines() if re.match(r"replay: compil(ing|ed \d+) kernels?\b", line) is None]
+
+
+FULL = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits are a matter of POSIX")
+@pytest.mark.parametrize("damage", ["none", "cut", "not there"])
+def test_on_a_full_disk_kernels_are_read_or_compiled_and_one_line_says_so(package, damage):
+    package.run(HITS)
+    (file,) = package.cache.rglob("*.kernel")
+    if damage == "cut":
+        file.write_bytes(file.read_bytes()[:1000])
+    elif damage == "not there":
+        file.unlink()
+    process = package.start(FULL + HITS + "; alone(1.0)")  # two are missing, and it is said once
+    out, said = process.communicate()
+    assert out.strip() == ("20.0 1" if damage == "none" else "20.0 0"), said
+    assert remarks(said) == [
+        "replay: compiled kernels cannot be kept: File too large; the next run compiles them again"
+    ]
+    assert file.exists() is (damage == "none")
+
+
+def test_where_nothing_can_be_kept_kernels_are_compiled_and_one_line_says_so(package, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way of every folder")
+    (package.root / "numerics" / "jit" / "__pycache__").write_text("")
+    environment = {"NUMBA_CACHE_DIR": str(blocked), "XDG_CACHE_HOME": str(blocked)}
+    code = "import tempfile; tempfile.tempdir = " + repr(str(blocked)) + "; print(directory())\n"
+    process = package.start(code + "outer(1.0); alone(1.0)", **environment)
+    out, said = process.communicate()
+    assert out.strip() == "None", said
+    assert len(remarks(said)) == 1
+    assert remarks(said)[0].startswith("replay: compiled kernels cannot be kept: ")
+
+
+@pytest.mark.parametrize("damage", ["index", "kernel", "full"])
+def test_numbas_own_cache_is_mended_too(package, damage):
+    file = package.root / "numerics" / "jit" / "compiler.py"
+    package.write("numerics/jit/compiler.py", file.read_text().replace('TRIED = ("0.68.",)', 'TRIED = ("0.",)[:0]'))
+    full = FULL if damage == "full" else ""
+    process = package.start(full + HITS)
+    out, said = process.communicate()
+    assert out.strip() == "20.0 0", said
+    if damage == "full":
+        assert len(remarks(said)) == 1 and "cannot be kept" in said
+        return
+    assert package.run(HITS) == "20.0 1"
+    for kept in package.cache.rglob("*.nbi" if damage == "index" else "*.nbc"):
+        kept.write_bytes(kept.read_bytes()[:-10] if damage == "kernel" else b"")
+    assert package.run(HITS) == "20.0 0"
+    assert package.run(HITS) == "20.0 1"
