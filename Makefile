@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 RECORDINGS := recordings
 BASELINES := tests/baselines
 NIGHT := regress
+# Python compiles the modules that are imported, when they are: of a fresh environment's 40 000 few ever are
+INSTALL := -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
@@ -15,12 +17,12 @@ help:  ## list the targets
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps $(PHANTOMS)
+	$(BIN)/python $(INSTALL) -e .
+	$(BIN)/python $(INSTALL) --no-deps $(PHANTOMS)
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(BIN)/python $(INSTALL) -e '.[test]'
 	@touch $@
 
 setup: $(VENV)/.run  ## create .venv and install the package and the phantoms
@@ -58,7 +60,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.comparison.rules_file
 
 bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
+	$(BIN)/python $(INSTALL) -e '.[bench]'
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 
