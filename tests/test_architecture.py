@@ -13,6 +13,7 @@ PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
     "numerics",
+    "language",
     "geometry",
     "logs",
     "kinematics",

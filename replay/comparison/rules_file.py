@@ -17,10 +17,10 @@ from pydantic import AfterValidator, PlainValidator, ValidationError, WithJsonSc
 
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.errors import InvalidValue, Problem, ScenarioError
-from replay.scenario.fields import Flag, Part, Text, rejected
+from replay.language.fields import Flag, Part, Text, rejected
+from replay.language.units import TIME, Quantity
 from replay.scenario.problems import translate
 from replay.scenario.source import Folder, SourceRule, locate
-from replay.scenario.units import TIME, Quantity
 from replay.scenario.yaml_text import Node, parse
 
 SCHEMA_FILE: Final = "rules.schema.json"

@@ -28,8 +28,6 @@ RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
 
-_SOURCES = (".py", ".binpb")
-
 
 @dataclass(frozen=True)
 class Provenance:
@@ -65,7 +63,7 @@ class Provenance:
 
     def to_metadata(self) -> dict[str, str]:
         """Return the values of the MCAP metadata record, each as JSON with sorted keys; `originals` only if any."""
-        values = vars(self) | {"layout": vars(self.layout)}
+        values = vars(self) | {"layout": self.layout.to_json()}
         if not self.originals:
             del values["originals"]
         return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
@@ -84,10 +82,7 @@ class Provenance:
                 raise RecordingError(file, f"has recording format {version}; this version of replay reads {readable}")
             written = {"originals": "{}", **values}
             known = {field.name: json.loads(written[field.name]) for field in dataclasses.fields(Provenance)}
-            layout = {field.name: known["layout"][field.name] for field in dataclasses.fields(Layout)}
-            if not all(isinstance(name, str) for group in layout.values() for name in group):
-                raise TypeError("names must be texts")
-            known["layout"] = Layout(**{key: tuple(group) for key, group in layout.items()})
+            known["layout"] = Layout.from_json(known["layout"])
             if not isinstance(known["frames"], int) or not isinstance(known["block_frames"], int):
                 raise TypeError("frame counts must be integers")
             if not all(isinstance(text, str) for origin in known["originals"].values() for text in origin.values()):
@@ -155,6 +150,6 @@ def _sources(folder: Traversable, prefix: str) -> list[tuple[str, bytes]]:
         if entry.is_dir():
             if entry.name != "__pycache__":
                 found += _sources(entry, f"{prefix}{entry.name}/")
-        elif entry.name.endswith(_SOURCES):
+        elif entry.name.endswith(".py"):
             found.append((prefix + entry.name, entry.read_bytes()))
     return found

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 from replay.errors import Problem
+from replay.language.node import Node
 from replay.scenario.model import Scenario
-from replay.scenario.node import Node
 from replay.scenario.source import Library, SourceRule, dotted, problem_at, resolve_name
 from replay.scenario.yaml_text import parse
+from replay.sensing.kinds import KINDS
 
 MAX_INCLUDE_DEPTH: Final = 8
 FRAGMENT_KEYS: Final = ("include", "links", "motion", "collision", "sensors", "model", "expect")
@@ -20,8 +21,7 @@ _MERGED_MAPS: Final = {
     ("motion", "free"),
     ("collision",),
     ("sensors",),
-    ("sensors", "distance"),
-    ("sensors", "capacitive"),
+    *(("sensors", kind) for kind in KINDS),
 }
 _MERGED_LISTS: Final = {("motion", "moves"), ("collision", "disable"), ("expect",)}
 

@@ -10,12 +10,12 @@ from pydantic import ValidationError
 
 from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
+from replay.language.node import Node
 from replay.scenario.checks import check
 from replay.scenario.include import Text
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.names import Names
-from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
 from replay.scenario.sensors import Sensors
@@ -102,7 +102,7 @@ def load_model(file_or_name: str | Path) -> Model:
     if not isinstance(root.value, dict) or "links" in root.mapping:
         what = "a scenario" if root.mapping else root.shown()
         raise ScenarioError(
-            [root.place.problem(f"a model is a mapping of collision, distance, capacitive, not {what}")]
+            [root.place.problem(f"a model is a mapping of {', '.join(Model.model_fields)}, not {what}")]
         )
     if set(root.mapping) == {"model"}:
         raise ScenarioError([root.keys["model"].problem("model: a file of a model begins one level below this key")])

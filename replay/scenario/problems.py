@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from replay.errors import Problem
-from replay.scenario import decimal_comma
-from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
-from replay.scenario.node import Node
+from replay.language import decimal_comma
+from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
+from replay.language.node import Node
+from replay.scenario.expectations import PARTS
 from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
 from replay.scenario.source import dotted, find, locate, problem_at
 
@@ -149,7 +150,7 @@ def _tag(kind: str, context: dict[str, Any], found: _Location, root: Node) -> Pr
         if node is not None and not isinstance(node.value, dict):
             return problem_at(root, path, "must be a mapping (key: value)", kind=True)
         return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing; known are {', '.join(found.tags)}")
-    return problem_at(root, path, "needs one of the keys pair, distance, capacitive")
+    return problem_at(root, path, f"needs one of the keys {', '.join(PARTS)}")
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from replay.errors import Problem
+from replay.language.node import Node, Place
 from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
-from replay.scenario.node import Node, Place
 
 if TYPE_CHECKING:
     from replay.kinematics.motion import FreeTrack, Track

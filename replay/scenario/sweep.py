@@ -12,9 +12,10 @@ from typing import Annotated, Any, Final, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from replay.errors import Problem
-from replay.scenario.fields import Part, rejected
-from replay.scenario.node import Node, Place
+from replay.language.fields import Part, rejected
+from replay.language.node import Node, Place
 from replay.scenario.source import dotted
+from replay.sensing.kinds import KINDS
 
 MAX_CASES: Final = 10_000
 MAX_NAME: Final = 100
@@ -28,8 +29,7 @@ _MAY_BE_LEFT_OUT: Final = {
     ("collision",),
     ("model",),
     ("model", "collision"),
-    ("model", "distance"),
-    ("model", "capacitive"),
+    *(("model", kind) for kind in KINDS),
 }
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
 

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from replay.errors import Problem
-from replay.scenario import decimal_comma
-from replay.scenario.node import Node, Place, Scalar
+from replay.language import decimal_comma
+from replay.language.node import Node, Place, Scalar
 
 __all__ = ["MAX_BYTES", "MAX_DEPTH", "MAX_DIGITS", "MAX_NODES", "Node", "parse"]
 

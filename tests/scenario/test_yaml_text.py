@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from replay.scenario.node import Node
+from replay.language.node import Node
 from replay.scenario.yaml_text import MAX_DEPTH, MAX_NODES, parse
 
 
