@@ -96,7 +96,8 @@ def compared_to_trimesh(path, data, solid):
     shared = not_paired(trimesh.Trimesh(**trimesh.triangles.to_kwargs(solid.triangles))) < not_paired(cleaned)
     least = min(cleaned.area, polygons_area(data)) if path.suffix.lower() == ".obj" else cleaned.area
     if area < (1 - 1e-6) * least:  # trimesh does not see flat pieces whose two sides are cut by other diagonals
-        least -= 0.5 * sum(part.area for part in cleaned.split() if abs(part.volume) < 1e-6 * part.area**1.5)
+        parts = [part for part in cleaned.split(only_watertight=False, repair=False) if part.is_watertight]
+        least -= 0.5 * sum(part.area for part in parts if abs(part.volume) < 1e-6 * part.area**1.5)
     if not (1 - 1e-6) * least <= area <= (1 + 1e-6) * cleaned.area and not shared:
         yield f"area {area}, not {least} to {cleaned.area}"
     if cleaned.is_watertight and not solid.watertight:
@@ -213,5 +214,5 @@ def test_every_mesh_of_a_package_is_read_told_and_sensed_as_it_is(package):
 
 
 def test_a_phantom_is_read_told_and_sensed_as_it_is():
-    (path,) = (path for path in meshes("pyskindose") if path.name == "adult_male.stl")
+    (path,) = (path for path in meshes("pyskindose") if path.name == "hudfrid_reduced_1000t.stl")
     assert not list(faults(path, np.random.default_rng(1)))
