@@ -76,12 +76,13 @@ pictures: $(VENV)/.test system  ## make the README's pictures, two of them from 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
 
-system:  # a software Vulkan driver for the viewer, and a browser that looks at reports in tests
-	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && command -v chromium >/dev/null || { \
+system:  # a software Vulkan driver for the viewer; for tests a browser, certificates, and what a process asks the system
+	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && \
+	  (for tool in chromium openssl strace; do command -v $$tool >/dev/null || exit 1; done) || { \
 	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	    apt-get update -qq && apt-get install -qq -y --no-install-recommends mesa-vulkan-drivers chromium >/dev/null; \
-	  else echo "screenshots need a Vulkan driver, tests a browser" \
-	    "(Debian: apt-get install mesa-vulkan-drivers chromium)" >&2; fi; }
+	    apt-get update -qq && apt-get install -qq -y --no-install-recommends mesa-vulkan-drivers chromium openssl strace >/dev/null; \
+	  else echo "screenshots need a Vulkan driver, tests a browser, openssl and strace" \
+	    "(Debian: apt-get install mesa-vulkan-drivers chromium openssl strace)" >&2; fi; }
 
 clean:  ## remove the environment, recordings and caches
 	rm -rf $(VENV) $(RECORDINGS) $(NIGHT) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
