@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RECORDINGS := recordings
 BASELINES := tests/baselines
 NIGHT := regress
-# Python compiles the modules that are imported, when they are: of a fresh environment's 40 000 few ever are
+# Python compiles the modules that are imported, when they are: of thousands in a fresh environment few ever are
 INSTALL := -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
