@@ -52,7 +52,7 @@ def check_address(address: str, certificates: Certificates | None = None) -> Non
     try:
         from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
-        raise MissingPackageError("distributed", "--dask", "pip install 'replay[dask]'") from None
+        raise MissingPackageError("distributed", "--dask", "pip install distributed") from None
     try:
         parse_host_port(parse_address(address)[1])
     except ValueError:

@@ -22,6 +22,7 @@ COMMANDS = {
     "run": "simulate scenarios and record them",
     "validate": "check scenarios without running them",
     "info": "say what is in a recording",
+    "schema": "print the JSON Schema of scenarios, for editors",
     "calibrate": "fit a capacitive sensor to a measured curve",
     "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
