@@ -39,7 +39,7 @@ def wheel(tmp_path_factory):
         "dist",
         ".",
     ]
-    done = subprocess.run(command, cwd=source, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, cwd=source, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     (built,) = (source / "dist").iterdir()
     return built
@@ -55,7 +55,7 @@ def installed(wheel, tmp_path_factory):
     # a path that is named by a .pth file is not searched for further .pth files: the checkout's own stays unseen
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     command = [sys.executable, "-m", "pip", "--python", str(python), "install", "--no-deps", "--no-index", str(wheel)]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return place
 
@@ -65,7 +65,7 @@ def use(installed, cwd, *arguments):
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     environment["NUMBA_CACHE_DIR"] = str(store.directory())
     command = [str(installed / "bin" / arguments[0]), *map(str, arguments[1:])]
-    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, cwd=cwd, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
