@@ -33,11 +33,13 @@ class Certificates:
         Raises:
             InvalidValue: one is named and another one that it needs is not.
         """
-        if authority is None and certificate is None and key is None:
+        named = {"--dask-ca": authority, "--dask-cert": certificate, "--dask-key": key}
+        given = [(name, file) for name, file in named.items() if file is not None]
+        if not given:
             return None
         if authority is None or certificate is None:
-            missing = "--dask-ca" if authority is None else "--dask-cert"
-            raise InvalidValue(missing, "", "is missing; TLS needs --dask-ca and --dask-cert (and --dask-key)")
+            missing = [name for name in ("--dask-ca", "--dask-cert") if named[name] is None]
+            raise InvalidValue(*given[-1], f"needs {' and '.join(missing)} beside it")
         return Certificates(authority, certificate, key)
 
 

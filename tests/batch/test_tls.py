@@ -78,8 +78,9 @@ def test_an_encrypted_address_needs_certificates(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"ca": None}, "--dask-ca = : is missing"),
-        ({"cert": None}, "--dask-cert = : is missing"),
+        ({"ca": None}, "--dask-key = .*key.pem: needs --dask-ca beside it"),
+        ({"ca": None, "cert": None}, "--dask-key = .*key.pem: needs --dask-ca and --dask-cert beside it"),
+        ({"cert": None, "key": None}, "--dask-ca = .*ca.pem: needs --dask-cert beside it"),
         ({"ca": "none.pem"}, "--dask-ca = .*none.pem: cannot be read: No such file"),
         ({"key": "none.pem"}, "--dask-key = .*none.pem: cannot be read: No such file"),
         ({"ca": "text"}, "--dask-ca = .*text: holds no certificate in PEM form"),
