@@ -63,11 +63,13 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
     """
     zero = (0.0, 0.0)
     best_point = (zero, zero, zero)
+    # interior
     inside = n == 4 and _contains_origin(points, size, weights)
     if inside and residual(points, n, weights) <= WITNESS * size:
         return True, best_point, zero
     best = (np.inf, 0.0)
     weights[:] = 0.0
+    # corners
     for i in range(n):
         p = corner(points, i)
         square = dd.dot(p, p)
@@ -76,6 +78,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
             best_point = p
             weights[:] = 0.0
             weights[i] = 1.0
+    # edges
     for i in range(n):
         for j in range(i + 1, n):
             if newest not in (-1, i, j):
@@ -97,6 +100,7 @@ def nearest(points: Floats, n: int, newest: int, size: float, weights: Floats) -
                 best_point = foot
                 weights[:] = 0.0
                 weights[i], weights[j] = max(of_p[0] / total[0], LEAST), max(of_q[0] / total[0], LEAST)
+    # faces
     for skipped in range(4):
         i = 0 if skipped > 0 else 1
         j = 1 if skipped > 1 else 2

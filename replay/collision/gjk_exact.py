@@ -198,6 +198,7 @@ def refine(
     inside, v, square = exact_simplex.nearest(points, n, -1, size, weights)
     for _ in range(ITERATIONS):
         result[STEPS] += 1.0
+        # v, the simplex's nearest point: the upper bound
         length = math.sqrt(square[0])
         result[DISTANCE] = length
         if inside or not length > TOUCHING * size:
@@ -209,6 +210,7 @@ def refine(
         n = keep_supporting(simplex, work.points, weights, n)
         for k in range(n):
             _point(points, k, a, simplex[k, 0], b, simplex[k, 1], rotation, translation)
+        # w, the point of A - B that is lowest along v: the lower bound
         backward = (dd.negative(v[0]), dd.negative(v[1]), dd.negative(v[2]))
         i = _farthest(a, set_a, rotation, translation, backward, False, size)
         j = _farthest(b, set_b, rotation, translation, v, True, size)
@@ -223,6 +225,7 @@ def refine(
             repeated = repeated or (simplex[k, 0] == i and simplex[k, 1] == j)
         if result[LOWER] > cutoff or repeated or length - result[LOWER] <= CLOSED * length:
             break
+        # w joins the simplex
         simplex[n, 0], simplex[n, 1] = i, j
         inside, nearer, square_nearer = exact_simplex.nearest(points, n + 1, n, size, weights)
         # equal lengths go on, since they still turn v; one that grows by more than its rounding ends the search
@@ -231,6 +234,7 @@ def refine(
         v, square = nearer, square_nearer
         n += 1
         simplex[4, 0] = n
+    # the verdict on what the search ended with
     n = simplex[4, 0]
     exact_simplex.nearest(points, n, -1, size, weights)
     write_witness(a, b, rotation, translation, work)

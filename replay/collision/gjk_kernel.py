@@ -86,6 +86,7 @@ def query(
         work: scratch; `work.result` holds the outcome, witness points only where the distance was asked for.
     """
     simplex, points, weights, result = work.simplex, work.points, work.weights, work.result
+    # the simplex of an earlier answer, in this pose
     n = simplex[4, 0]
     for k in range(n):
         x, y, z = mapped(b, simplex[k, 1], rotation, translation)
@@ -104,19 +105,23 @@ def query(
             if not square > bound * bound:
                 d, square = (size, 0.0, 0.0), size * size
         else:
+            # v, the simplex's nearest point: the upper bound
             place, d, square, wa, wb, wc, wd = _nearest(points, n, size)
             weights[0], weights[1], weights[2], weights[3] = wa, wb, wc, wd
+            # CONTACT
             if place == faces.INSIDE:
                 if not _witness_distance(points, n, weights) <= WITNESS * size:
                     break  # a flat tetrahedron: its shares are mostly rounding
                 result[DISTANCE] = 0.0
                 write_witness(a, b, rotation, translation, work)
                 return CONTACT
+            # a doubtful tetrahedron, no direction left in v, or v does not shrink
             if place == faces.UNSURE or not (bound * bound < square < shortest):
                 break
             shortest = square
             n = keep_supporting(simplex, points, weights, n)
         result[STEPS] += 1.0
+        # w, the point of A - B that is lowest along d: the lower bound
         i = farthest(a, begin_a, end_a, table_a, side_a, -d[0], -d[1], -d[2])
         x, y, z = turned_back(rotation, d[0], d[1], d[2])
         j = farthest(b, begin_b, end_b, table_b, side_b, x, y, z)
@@ -128,10 +133,12 @@ def query(
             if lower > result[LOWER]:
                 result[LOWER] = lower
                 result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -d[0], -d[1], -d[2]
+                # SEPARATED by more than is asked for
                 if lower > cutoff:
                     result[DISTANCE] = lower
                     return SEPARATED
             length = math.sqrt(square)
+            # SEPARATED, both bounds met
             if n > 0 and length - result[LOWER] <= CLOSED * length + slack:
                 witness = _witness_distance(points, n, weights)
                 if not max(abs(witness - length), result[LOWER] - length) <= CLOSED * length + slack + bound:
@@ -139,6 +146,7 @@ def query(
                 result[DISTANCE] = length
                 write_witness(a, b, rotation, translation, work)
                 return SEPARATED
+        # w joins the simplex, unless it is there
         repeated = False
         for k in range(n):
             repeated = repeated or (simplex[k, 0] == i and simplex[k, 1] == j)

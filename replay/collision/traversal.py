@@ -126,6 +126,7 @@ def closest(
                     nodes[waiting, 0], nodes[waiting, 1], gaps[waiting] = i1, j1, gap1
                     waiting += 1
                 continue
+            # two leaves: their convex sets, unless the seed was these
             set_a = bodies.set_first[a] + bodies.tree.order[bodies.set_first[a] + bodies.tree.begin[row_i]]
             set_b = bodies.set_first[b] + bodies.tree.order[bodies.set_first[b] + bodies.tree.begin[row_j]]
             if set_a == tried_a and set_b == tried_b:
@@ -141,6 +142,7 @@ def closest(
             if distance <= best and limit > 0.0:
                 best, found = distance, True
             distance = max(work.result[LOWER], 0.0)
+        # the nearest sets seed the next frame
         if distance < nearest or status != SEPARATED:
             nearest = distance
             seed[0, 0], seed[0, 1] = set_a, set_b

@@ -76,15 +76,18 @@ def obbs_meet(
     s0 = (abs(r0[0]), abs(r0[1]), abs(r0[2]))
     s1 = (abs(r1[0]), abs(r1[1]), abs(r1[2]))
     s2 = (abs(r2[0]), abs(r2[1]), abs(r2[2]))
+    # a_i
     for i in range(3):
         if abs(t[i]) > half_a[i] + half_b[0] * s0[i] + half_b[1] * s1[i] + half_b[2] * s2[i] + slack:
             return False
+    # b_j
     if _face_apart(t, r0, s0, half_a, half_b[0] + slack):
         return False
     if _face_apart(t, r1, s1, half_a, half_b[1] + slack):
         return False
     if _face_apart(t, r2, s2, half_a, half_b[2] + slack):
         return False
+    # a_i x b_j
     if _edges_apart(t, r0, s0, s1, s2, half_a, half_b[1], half_b[2], slack):
         return False
     if _edges_apart(t, r1, s1, s2, s0, half_a, half_b[2], half_b[0], slack):

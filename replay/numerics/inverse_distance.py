@@ -213,6 +213,7 @@ def _edge_term(p: tuple[float, float], q: tuple[float, float], along: float, acr
 
 @kernel
 def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
+    # the longest edge becomes the one from a to b
     ab, bc, ca = norm(minus(b, a)), norm(minus(c, b)), norm(minus(a, c))
     if bc >= ab and bc >= ca:
         a, b, c = b, c, a
@@ -230,6 +231,7 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
     elif dot(minus(c, b), edge) > 0.0:
         b, c = c, b
         length = norm(minus(b, a))
+    # the origin in a corner: along the rays from it, twice the mean over the opposite edge
     r_a, r_b, r_c = norm(a), norm(b), norm(c)
     if r_a <= 0.0:
         return 2.0 * mean_over_segment(b, c)
@@ -239,6 +241,7 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
         return 2.0 * mean_over_segment(a, b)
     if length <= 0.0:
         return 1.0 / r_a
+    # far away: Gauss
     ratio = norm(along(along(a, 1.0, b), 1.0, c)) / (3.0 * length)
     if ratio > _FAR:
         return _far_mean(a, b, c, ratio)
@@ -266,11 +269,13 @@ def _mean_over_triangle(a: Triple, b: Triple, c: Triple) -> float:
         s_a = s_b - length
         height = along(b, -s_b, t)
     distance = r_a if s_a > 0.0 else (r_b if s_b < 0.0 else norm(height))
+    # a sliver: two halves, by rays from their far corners
     if distance > 2.0 * width:
         foot_point = minus(c, across)
         first = _half_sliver_mean(a, foot_point, c) if foot != 0.0 else 0.0
         second = _half_sliver_mean(b, foot_point, c) if back != 0.0 else 0.0
         return (foot * first - back * second) / length
+    # closed form, in the triangle's own plane
     m = (across[0] / width, across[1] / width, across[2] / width)
     n = cross(t, m)
     base = 0 if r_a <= r_b and r_a <= r_c else (1 if r_b <= r_c else 2)

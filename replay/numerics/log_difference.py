@@ -44,6 +44,7 @@ def mean_inverse_linear(z0: float, z1: float, z2: float) -> float:
         z0, z1 = z1, z0
     if z1 <= 0.0:
         return math.inf
+    # close values: the series about their mean
     m = z1 + ((z0 - z1) + (z2 - z1)) / 3.0
     if z2 - z0 <= _SERIES_SPREAD * m:
         e1 = (z1 - m) / m
@@ -59,6 +60,7 @@ def mean_inverse_linear(z0: float, z1: float, z2: float) -> float:
             total += sign * current / ((k + 1.0) * (k + 2.0))
             sign = -sign
         return 2.0 * total / m
+    # f01 and f12
     a = (z1 - z0) / z1
     b = (z2 - z1) / z1
     f01 = 1.0

@@ -115,6 +115,7 @@ def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, 
         h, area, sigma = lanes[RADIUS * LANES + i], lanes[AREA * LANES + i], lanes[SIGMA * LANES + i]
         middle = (lanes[MIDDLE * LANES + i], lanes[(MIDDLE + 1) * LANES + i], lanes[(MIDDLE + 2) * LANES + i])
         half = (lanes[HALF * LANES + i], lanes[(HALF + 1) * LANES + i], lanes[(HALF + 2) * LANES + i])
+        # where the node lies, and the verdict
         x = ex[0] * a + ex[1] * b + ex[2] * c + tx
         y = ey[0] * a + ey[1] * b + ey[2] * c + ty
         z = ez[0] * a + ez[1] * b + ez[2] * c + tz
@@ -124,12 +125,14 @@ def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, 
         verdict = 1.0 if r > CLOSEST * h else 0.0
         verdict = 0.0 if not both and z - below <= blur else verdict
         verdict = -1.0 if not both and z + above < -blur else verdict
+        # what the expansion leaves out
         inverse, nearest = 1.0 / r, 1.0 / (r - h)
         cube = inverse * inverse * inverse
         fifth = _FIFTH[0] if beyond_x > 0.0 else _FIFTH[1]
         fifth = fifth if beyond_y > 0.0 else (_FIFTH[1] if beyond_x > 0.0 else _FIFTH[2])
         odd = min(fifth * lanes[ODD5 * LANES + i], lanes[MEAN5 * LANES + i])
         error = cube * cube * (odd + lanes[MEAN6 * LANES + i] * nearest)
+        # what lies over the borders
         up, down = _reaches(ex, middle, half, h)
         more_x, less_x = _over_borders(x, half_x, up, down, _spread(sigma, up, down, blur), blur)
         up, down = _reaches(ey, middle, half, h)

@@ -68,11 +68,13 @@ def integral_over_triangle(
     below = z0 < 0.0 or z1 < 0.0 or z2 < 0.0
     if not above and not both:
         return 0.0
+    # on one side of z = 0: within one region, or cut by borders alone
     if not (above and below) and min(abs(z0), abs(z1), abs(z2)) > 0.0:
         east, north = _slab(triangle, 0, half_x), _slab(triangle, 1, half_y)
         if _SEVERAL not in (east, north):
             return area * _uncut(triangle, east, north, half_x, half_y)
         return area * _half(triangle, 1.0 if above else -1.0, half_x, half_y, scratch)
+    # across z = 0 or with a part in it: infinite, or each side by itself
     if contact(triangle, half_x, half_y, both) == SATURATED:
         return math.inf
     mean = 0.0
@@ -98,8 +100,10 @@ def _slab(triangle: Floats, axis: int, half: float) -> int:
 @kernel
 def _uncut(triangle: Floats, east: int, north: int, half_x: float, half_y: float) -> float:
     """Return the mean of 1/dist over a triangle on one side of z = 0 and within one region."""
+    # region I
     if east == 0 and north == 0:
         return mean_inverse_linear(abs(triangle[0, 2]), abs(triangle[1, 2]), abs(triangle[2, 2]))
+    # regions II (one of east and north is 0) and III
     return mean_over_triangle(
         (abs(east) * (abs(triangle[0, 0]) - half_x), abs(north) * (abs(triangle[0, 1]) - half_y), abs(triangle[0, 2])),
         (abs(east) * (abs(triangle[1, 0]) - half_x), abs(north) * (abs(triangle[1, 1]) - half_y), abs(triangle[1, 2])),
@@ -155,6 +159,7 @@ def _fan(piece: Floats, count: int, u: int, v: int, triangle: Floats) -> float:
         part = share(piece, 0, k, k + 1, triangle)
         if part <= 0.0:
             continue
+        # region I
         if u == NONE and v == NONE:
             mean = mean_inverse_linear(piece[0, HEIGHT], piece[k, HEIGHT], piece[k + 1, HEIGHT])
         else:

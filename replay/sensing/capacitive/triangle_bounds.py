@@ -66,6 +66,7 @@ def judge_loaded(count: int, plate: PlacedPlate, lanes: Floats) -> None:
         u, v = beyond_borders(x, y, half_x, half_y)
         square = u * u + v * v + z * z
         r = math.sqrt(square)
+        # the cheapest rule, with what lies over the borders
         inverse, nearest, farthest = 1.0 / r, 1.0 / (r - h), 1.0 / (r + h)
         most, least = nearest * nearest * nearest, farthest * farthest * farthest
         shift_x, doubt_x = over_borders(a[0], b[0], c[0], x, half_x, most, least)
@@ -74,6 +75,7 @@ def judge_loaded(count: int, plate: PlacedPlate, lanes: Floats) -> None:
         shift = area * (shift_x + shift_y)
         shift = area * inverse if rule == POINTS_1 else shift
         at_least = area / math.sqrt(square + spread)
+        # across z = 0 only the part above counts
         crossing = not both and low <= 0.0
         value, wrong = part_above(a, b, c, area, spread, h, half_x, half_y)
         far_enough = first == POINTS_1 and low < 0.0 < high and wrong <= allowed

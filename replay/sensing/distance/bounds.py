@@ -87,15 +87,19 @@ def box_bounds(boxes: Singles, middle: Vector, cone: Cone, slack: float, bounds:
         h = single_vector(boxes, HALVES, lane)
         c0, c1, c2 = dot(e0, c), dot(e1, c), dot(e2, c)
         v0, v1, v2 = dot(e0, v), dot(e1, v), dot(e2, v)
+        # Distance to the box
         gap = (max(abs(c0) - h[0], 0.0), max(abs(c1) - h[1], 0.0), max(abs(c2) - h[2], 0.0))
 
+        # f(C) + |half widths| < 0
         along, across = dot(v, c), norm(cross(v, c))
         outside = across * cos_half - along * sin_half - slack  # -f(C)
         far = (outside > 0.0) & (outside * outside > dot(h, h))
+        # g · C + sum h_i |g · e_i| < 0
         turned = sin_half * across + cos_half * along
         g = (abs(turned * v0 - cos_half * c0), abs(turned * v1 - cos_half * c1), abs(turned * v2 - cos_half * c2))
         rounding = 16.0 * EPSILON * (across + abs(along)) * (h[0] + h[1] + h[2])
         beside = outside * across > dot(h, g) + rounding  # both sides times `across`
+        # v · C + sum h_i |v · e_i| < 0
         behind = along + dot(h, (abs(v0), abs(v1), abs(v2))) < -slack
         bounds[lane] = np.inf if far | (narrow & (beside | behind)) else (1.0 - SHORT) * dot(gap, gap)
 

@@ -76,10 +76,11 @@ def closest_on_edge(
     e = subtract(b, a)
     doubled = norm(area)
     squared = dot(e, e)
+    # No plane: an edge on a line through the apex
     if doubled == 0.0 or squared == 0.0:
         return _radial_edge(a, b, length_a, length_b, cone)
 
-    # Foot of the apex on the edge
+    # Foot of the apex on the edge (case 4)
     off_line, foot = _foot(a, e, area, doubled, squared)
     has_foot = dot(a, e) < 0.0 < dot(b, e)
     nearest = off_line if has_foot else min(length_a, length_b)
@@ -99,6 +100,7 @@ def closest_on_edge(
         opening = (cone.sin_half - mu) * (cone.sin_half + mu)
     else:
         opening = (s - cos_half) * (s + cos_half)
+    # The plane misses the cone, or its complement, or is orthogonal to the axis
     if opening < 0.0 or s == 0.0:
         if not wide and opening < 0.0:
             return np.inf, a, NOTHING
@@ -115,6 +117,7 @@ def closest_on_edge(
     foot_x, foot_y = dot(foot, w), dot(foot, k)
     if has_foot and _in_volume(foot_x, -foot_x * D - foot_y * cos_half, foot_x * D - foot_y * cos_half, wide):
         return off_line, foot, EDGE_FOOT
+    # Corners (case 5)
     a_x, a_y, b_x, b_y = dot(a, w), dot(a, k), dot(b, w), dot(b, k)
     entry_a, exit_a = -a_x * D - a_y * cos_half, a_x * D - a_y * cos_half
     entry_b, exit_b = -b_x * D - b_y * cos_half, b_x * D - b_y * cos_half
@@ -124,7 +127,7 @@ def closest_on_edge(
     if length_b < distance and _in_volume(b_x, entry_b, exit_b, wide):
         distance, point, case = length_b, b, CORNER
 
-    # Crossings of the border
+    # Crossings of the border (case 3)
     for side in (-1.0, 1.0):
         before = entry_a if side < 0.0 else exit_a
         after = entry_b if side < 0.0 else exit_b

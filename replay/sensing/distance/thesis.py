@@ -71,7 +71,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
     """Return distance (inf when none), point and case of a triangle relative to the apex, by the thesis's steps."""
     best, point, case = np.inf, a, NOTHING
 
-    # 1 and 2: R, and the ray from R towards S
+    # 1: R
     normal = cross(subtract(b, a), subtract(c, a))
     area = norm(normal)
     if area > 0.0:
@@ -80,6 +80,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
         R = scaled(height, n)
         if dot(v, R) >= norm(R) * cos_half and _in_triangle(R, a, b, c, n):
             return norm(R), R, FOOT
+        # 2: the ray from R towards S
         lean = dot(n, v)
         if lean != 0.0:
             towards = subtract(scaled(height / lean, v), R)

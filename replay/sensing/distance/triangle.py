@@ -97,6 +97,7 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
         max(abs(a[1]), abs(b[1]), abs(c[1])),
         max(abs(a[2]), abs(b[2]), abs(c[2])),
     )
+    # Apex on a corner
     near = cone.rounding
     if touches(a, length_a, size, near) or touches(b, length_b, size, near) or touches(c, length_c, size, near):
         return 0.0, (0.0, 0.0, 0.0), CORNER
@@ -134,10 +135,12 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
             v = (cone.vx, cone.vy, cone.vz)
             cos_phi = dot(n, v)
             sin_phi = norm(accurate_cross(n, v))
+            # psi <= 0: the foot R (case 1)
             if sin_phi * cone.cos_half - cos_phi * cone.sin_half <= 0.0:
                 if _in_triangle(foot, a, b, c, turned, slack):
                     return delta, foot, FOOT
             else:
+                # psi > 0: the border ray r (case 2), none from 90 deg on
                 cos_psi = cos_phi * cone.cos_half + sin_phi * cone.sin_half
                 if cos_psi > 0.0 and delta <= 2.0 * extent * cos_psi:
                     along = delta / cos_psi
