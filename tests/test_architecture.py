@@ -12,6 +12,9 @@ import replay
 PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
+    "lfs_pointer",
+    "limits",
+    "json_text",
     "numerics",
     "language",
     "geometry",

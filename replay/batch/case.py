@@ -15,6 +15,7 @@ from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.verdict import ExpectationCheck, Outcome
 
 if TYPE_CHECKING:
+    from replay.batch.written import WrittenResult
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -106,8 +107,8 @@ class CaseResult:
         }
 
     @staticmethod
-    def from_json(values: dict[str, Any], recordings: RecordedPaths) -> CaseResult:
-        """Return the result that `as_json` wrote, as one that is reused; KeyError, TypeError or ValueError if none."""
+    def from_json(values: WrittenResult, recordings: RecordedPaths) -> CaseResult:
+        """Return the result that `as_json` wrote, as one that is reused; ValueError if its status is none."""
         return CaseResult(
             name=values["scenario"],
             status=Status(values["status"]),

@@ -21,6 +21,7 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
     from replay.recording.picture import picture
     from replay.recording.side_by_side import one_recording
     from replay.recording.viewer import rerun_files, show
+    from replay.recording.web_page import serve
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at belongs to --screenshot")
@@ -31,8 +32,11 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
     if screenshot is not None and web:
         raise click.UsageError("--screenshot and --web exclude each other")
     with one_recording(rerun_files(recordings)) as file:
-        if screenshot is None:
-            show(file, web=web)
+        if web:
+            names = ", ".join(path.name for path in recordings)
+            serve(file, lambda address: click.echo(f"{address} shows {names} until Ctrl-C"))
+        elif screenshot is None:
+            show(file)
         else:
             picture(file, screenshot, at=at)
             click.echo(str(screenshot))

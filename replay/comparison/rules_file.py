@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import datetime
 import json
-import math
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -48,7 +48,7 @@ def _shift(value: object) -> Shift:
 
 
 def _bound(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= sys.float_info.max:
         raise rejected("must be a number that is not negative, in the signal's SI unit")
     return float(value)
 

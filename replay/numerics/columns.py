@@ -55,6 +55,7 @@ class Field:
         chart: title of the chart that shows it over time; "" for none.
         beam: it is a point in world coordinates, drawn at the end of a line from its sensor.
         type: of the values.
+        most: largest value of one that counts or is a state; of `states` it follows.
         nothing: the value when there is nothing to tell.
     """
 
@@ -73,6 +74,7 @@ class Field:
     chart: str = ""
     beam: bool = False
     type: np.dtype[Any] = dataclasses.field(default_factory=lambda: np.dtype(np.float64))
+    most: int = 1
     nothing: float = np.nan
 
 
@@ -107,6 +109,7 @@ def _described(name: str, array: Any, field: Field) -> Field:
         kind=Kind.LEVEL if field.states else kinds.get(dtype.kind, Kind.CATEGORY),
         label=field.label or name.replace("_", " "),
         begins=field.begins or tuple(field.events),
+        most=max(field.states) if field.states else field.most,
         type=dtype,
         nothing=nothing.get(dtype.kind, 0),
     )

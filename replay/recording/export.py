@@ -17,7 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.errors import InvalidValue
+from replay import limits
+from replay.errors import InvalidValue, LimitError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
 from replay.logs.tables import topic_table
@@ -101,6 +102,9 @@ def export(
         if not fnmatch.filter(sources, pattern):
             raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
     chosen = [topic for topic in sorted(sources) if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)]
+    if isinstance(recording, McapLog) and len(chosen) * recording.unpacked > limits.passes(recording.size):
+        rule = f"has {len(chosen)} topics to be looked for in {recording.unpacked} bytes; choose some with --topic"
+        raise LimitError(str(recording.path), rule)
     directory = Path(directory)
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
     if format == "json":

@@ -30,6 +30,9 @@ FRAMES = "/joint_states"
 """The topic that is in every recording and tells its frames."""
 
 
+_NUMBER = Field()
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A whole recording: the columns of `FrameBlock` for all F frames.
@@ -212,22 +215,36 @@ class _Assembly:
             raise RecordingError(self._file, f"damaged: topic {name!r} is missing")
         return self._topics[name]
 
-    def _column(self, topic: Topic, path: str, dtype: Any = np.float64, count: int | None = None) -> NDArray[Any]:
+    def _column(self, topic: Topic, path: str, field: Field = _NUMBER, count: int | None = None) -> NDArray[Any]:
         """Take a value of all frames out of a topic, (F,) or, with `count`, (F, count); so memory holds it once."""
         frames = len(self._frames)
         column = topic.columns.pop(path, None)
         if column is None and (count == 0 or not len(topic.time)) and topic.messages is None:
-            column = np.zeros((len(topic.time), *(() if count is None else (count,))))
+            column = np.zeros((len(topic.time), *(() if count is None else (count,))), field.type)
         if column is None or column.shape[1:] != (() if count is None else (count,)):
             raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is missing or misshapen")
-        return column[:frames].astype(dtype, copy=False)
+        least, most = self._range(field)
+        if column.dtype.kind not in {"f": "f", "b": "b"}.get(field.type.kind, "iu"):
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is of another type")
+        column = column[:frames]
+        if field.type.kind != "f" and column.size and not (column.min() >= least and column.max() <= most):
+            wrong = int(column.min() if column.min() < least else column.max())
+            rule = f"{wrong}, which is none of {least} to {most}"
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is {rule}")
+        return column.astype(field.type, copy=False)
+
+    def _range(self, field: Field) -> tuple[int, int]:
+        """Return the least and the largest value of a field that counts or names something."""
+        if field.names:
+            return -1, len(getattr(self._layout, field.names)) - 1
+        return (-1 if field.type.kind == "i" else 0), field.most
 
     def _field(self, topic: Topic, field: Field) -> NDArray[Any]:
         """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n)."""
         if field.letters:
-            return np.stack([self._column(topic, f"{field.name}.{c}", field.type) for c in field.letters], axis=1)
+            return np.stack([self._column(topic, f"{field.name}.{c}", field) for c in field.letters], axis=1)
         count = len(getattr(self._layout, field.each)) if field.each else None
-        return self._column(topic, field.name, field.type, count)
+        return self._column(topic, field.name, field, count)
 
     def _check_names(self, topic: Topic, path: str, names: tuple[str, ...]) -> None:
         if any(topic.texts.get(path.format(index)) != name for index, name in enumerate(names)) and len(self._frames):

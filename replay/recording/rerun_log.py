@@ -98,7 +98,7 @@ class RerunWriter:
         """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
             layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
-            self._stream.send_blueprint(layout, make_active=False)
+            self._file.arrange(layout)
             self._stream = None
             self._file.finish()
 

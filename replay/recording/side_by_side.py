@@ -74,7 +74,7 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
                 for chunk in reader.stream():
                     _copy(stream, chunk, side, found)
         eye = blueprint.eye_of_all(found.eyes or [_SOMEWHERE])
-        stream.send_blueprint(blueprint.side_by_side(sides, sorted(found.charts), eye, found.end), make_active=False)
+        result.arrange(blueprint.side_by_side(sides, sorted(found.charts), eye, found.end))
         result.commit()
     except BaseException:
         result.discard()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from replay import limits
 from replay.errors import Problem
 from replay.language.node import Node
 from replay.scenario.model import Scenario
@@ -54,6 +55,11 @@ class Text:
     def _tree(self, name: str, data: bytes, above: tuple[str, ...]) -> Node | None:
         self.sources[name] = data
         shown = self.library.shown(name)
+        if sum(map(len, self.sources.values())) > limits.YAML_TOTAL:
+            rule = f"with what was included before it has more than the {limits.YAML_TOTAL} bytes that are read"
+            self.problems.append(Problem(rule, file=shown))
+            self.whole = False
+            return None
         self.names[shown] = name
         root = parse(data, shown, self.problems)
         self.whole &= root is not None and root.whole

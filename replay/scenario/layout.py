@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -43,15 +43,13 @@ class Layout:
         return values | {f"{kind}_sensors": self.sensors.get(kind, ()) for kind in KINDS}
 
     @staticmethod
-    def from_json(values: Mapping[str, Any]) -> Layout:
-        """Return the names that metadata hold; KeyError, TypeError or ValueError when they are none.
+    def from_json(values: Mapping[str, Sequence[str]]) -> Layout:
+        """Return the names that metadata hold; KeyError when a group is missing.
 
         Of a kind that the recording does not know there are no sensors.
         """
         groups = {key: values[key] for key in ("links", "joints", "joint_units", "shapes", "pairs", "objects")}
         sensors = {kind: values.get(f"{kind}_sensors", ()) for kind in KINDS}
-        if not all(isinstance(name, str) for names in (*groups.values(), *sensors.values()) for name in names):
-            raise TypeError("names must be texts")
         return Layout(
             **{key: tuple(names) for key, names in groups.items()},
             sensors={kind: tuple(names) for kind, names in sensors.items()},

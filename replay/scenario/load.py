@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from replay import limits
 from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
 from replay.language.node import Node
@@ -177,7 +179,8 @@ class _File:
             problems.extend(_not_told(problems, translate(error, root, Scenario)))
             named = named and not any("[key]" in detail["loc"] for detail in error.errors(include_url=False))
         if named:  # else names would be missed that are written, but not to be read
-            problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
+            found = itertools.islice(check(Names(root, scenario)), limits.PROBLEMS)
+            problems.extend(problem_at(root, path, rule) for path, rule in found)
         provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:

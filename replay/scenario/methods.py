@@ -16,7 +16,7 @@ METHOD_REVISIONS: Final = {
     "collision.bounds.sphere": 1,
     "collision.narrowphase.gjk": 1,
     "collision.narrowphase.fcl": 1,
-    "collision.pieces.exact": 2,
+    "collision.pieces.exact": 3,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
 } | {f"{kind.name}.{method}": revision for kind in KINDS.values() for method, revision in kind.revisions.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import types
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from replay import limits
 from replay.errors import Problem
 from replay.language import decimal_comma
 from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
@@ -20,11 +22,14 @@ from replay.scenario.source import dotted, find, locate, problem_at
 
 Path = tuple[str | int, ...]
 
+_LIKELY, _LONG = 500, 200
+"""How many names a word is compared with, and how much of it: the time grows with their product."""
+
 
 def did_you_mean(word: str, known: Iterable[str], *, what: str = "known are") -> str:
     """Return "did you mean 'x'?", or all that is known when nothing is close."""
-    names = list(known)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    names = list(itertools.islice(known, _LIKELY))
+    close = difflib.get_close_matches(word[:_LONG], names, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
@@ -40,7 +45,7 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
         model: the model.
     """
     problems: dict[str, Problem] = {}
-    for detail in error.errors(include_url=False, include_input=False):
+    for detail in error.errors(include_url=False, include_input=False)[: limits.PROBLEMS]:
         if detail["type"] == "too_short" and _long_enough(detail, root, model):
             continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)

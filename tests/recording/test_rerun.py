@@ -17,11 +17,12 @@ from rerun.chunk import RrdReader
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
 from replay.recording.blueprint import eye_of, eye_of_all
-from replay.recording.picture import _cause, picture, viewer_binary
+from replay.recording.picture import _cause, picture
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
 from replay.recording.scene_view import BodyView, indexed
 from replay.recording.surfaces import corner_normals
+from replay.recording.viewer_process import viewer_binary
 from tests.recording import moving
 from tests.recording.synthetic import drawn
 
