@@ -62,6 +62,7 @@ class Cluster:
         prepare: called before the task, in the process that runs it.
         follow: called with (name, 0, 0) when a task is handed over.
         check: called about ten times a second; what it raises ends the run.
+        undisturbed: as of `Pool`.
     """
 
     def __init__(
@@ -74,11 +75,13 @@ class Cluster:
         prepare: Prepare | None = None,
         follow: Callable[[str, int, int], None] = lambda name, done, total: None,
         check: Callable[[], None] = lambda: None,
+        undisturbed: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
     ) -> None:
         self._address = address
         self._settings: dict[str, Any] = {"work": work, "timeout": timeout, "memory": memory, "prepare": prepare}
         self._follow = follow
         self._check = check
+        self._undisturbed = undisturbed
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -93,7 +96,7 @@ class Cluster:
             client: Any = Client(self._address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise WorkerError(f"the Dask scheduler {self._address} does not answer ({error})") from None
-        with contextlib.closing(client):
+        with contextlib.closing(client), self._undisturbed():
             executor = client.get_executor(pure=False)
             ordered = sorted(tasks, key=lambda task: (-task.cost, task.name))
             try:
@@ -147,11 +150,12 @@ def _unpacked(task: Task, future: Any) -> Ended:
         return Ended(task, Ending.CRASHED, None, f"on the cluster: {error}", 0.0, 0)
     folder = task.payload.folder
     try:
-        for name, data in parcel.files.items():
+        (folder / f"{task.name}.rrd").unlink(missing_ok=True)  # so that at no moment it stands beside another's log
+        for name, data in sorted(parcel.files.items()):
             write_file(folder / name, data)
     except NoSpaceError:
         raise
-    except WriteError as error:
+    except (WriteError, OSError) as error:
         return Ended(task, Ending.CRASHED, None, str(error), parcel.ended.seconds, parcel.ended.memory)
     value = parcel.ended.value
     if isinstance(value, CaseResult):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shlex
 from collections.abc import Mapping
@@ -13,7 +14,8 @@ from typing import Any
 from urllib.parse import quote
 
 import replay
-from replay.batch.judged import LOG, OVERLAY, Judged, Regression, Verdict
+from replay.batch.case_folder import LOG
+from replay.batch.judged import OVERLAY, Judged, Regression, Verdict
 from replay.comparison import report_html
 from replay.errors import count
 
@@ -94,8 +96,17 @@ def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
     names = [name.format(name=item.name) for name in _FILES]
     links = [(name, f"{quote(item.name)}/{quote(name)}") for name in names if (folder / name).is_file()]
     if item.comparison is not None:
-        links.append(("baseline", Path(item.comparison.baseline).resolve().as_uri()))
+        links.append(("baseline", _address(Path(item.comparison.baseline).resolve(), found.run.directory.resolve())))
     return tuple(links)
+
+
+def _address(file: Path, folder: Path) -> str:
+    """Return a file's address as seen from a page in a folder, so that both can be moved together."""
+    try:
+        way = Path(os.path.relpath(file, folder))
+    except ValueError:  # it is on another drive
+        return file.as_uri()
+    return "/".join(quote(os.fsencode(part)) for part in way.parts)
 
 
 @cache

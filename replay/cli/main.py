@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 import replay
-from replay.cli import interruption
+from replay.cli import interruption, outlets
 from replay.cli.exit_codes import ExitCode
 from replay.errors import ReplayError
 
@@ -80,6 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     files and takes the viewer with it.
     """
     interruption.install()
+    outlets.install()
     for stream in (sys.stdout, sys.stderr):  # a name that the terminal cannot show is shown as escapes
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -117,9 +118,6 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except (KeyboardInterrupt, click.Abort):
         click.echo("replay: interrupted", err=True)
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()  # nobody reads on; Python would complain about it at exit
-        return ExitCode.FINE
     except OSError as error:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
             return _fault(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -99,6 +100,10 @@ class RunProgress:
     def check(self) -> None:
         """Raise KeyboardInterrupt when the command was asked to stop."""
         interruption.check()
+
+    def undisturbed(self) -> AbstractContextManager[None]:
+        """Return a context in which a request to stop waits for `check`."""
+        return interruption.undisturbed()
 
     def tell(self, text: str) -> None:
         """Say something above the bars."""
