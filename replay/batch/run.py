@@ -159,7 +159,8 @@ def _run_orders(
     with contextlib.closing(_endings(tasks, workers, execution, watch, claimed)) as endings:
         for ended in endings:
             result = _result(ended)
-            file.add(result)  # first: it is true whatever comes next
+            if result.status.recorded:  # that is true whatever comes next
+                file.add(result)
             result = finish(result, ended.task.payload.folder)
             _settle(result, file, directory)
             watch.done(result)
