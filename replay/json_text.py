@@ -6,6 +6,7 @@ import functools
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from replay import limits
@@ -46,6 +47,18 @@ def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES) -> Any:
         raise ValueError("a number in it is too long") from None
     except RecursionError:
         raise ValueError("its lists and objects are nested too deeply") from None
+
+
+def read_json_file(path: Path, *, most: int = limits.RECORD_JSON) -> Any:
+    """Return what a file of JSON holds, of at most so many bytes; OSError or ValueError when there is none.
+
+    What is no plain file, such as a pipe, is none.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(str(path))
+    if path.stat().st_size > most:
+        raise ValueError(f"it has more than {most} bytes")
+    return read_json(path.read_bytes())
 
 
 def typed(value: Any, type_: Callable[..., Value]) -> Value:

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+from pathlib import Path
 
 import pytest
 
@@ -108,6 +109,48 @@ def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
     mesh.unlink()
     with pytest.raises(RecordingError, match="neither attached nor in a folder 'objects'"):
         attached_files(baseline.recording("a"))
+
+
+@pytest.mark.parametrize("after", [0, 1, 2])
+def test_an_acceptance_that_was_killed_is_completed_by_the_next(run, tmp_path, monkeypatch, after):
+    """Each baseline is wholly old or new at any moment, no mesh is missing, and the log says all that was put."""
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    replace, count = Path.replace, iter(range(9))
+
+    def killing(file, target):
+        if file.parent.name == ".staging" and target.suffix == ".mcap" and next(count) == after:
+            raise KeyboardInterrupt
+        return replace(file, target)
+
+    monkeypatch.setattr(Path, "replace", killing)
+    if after < 2:
+        with pytest.raises(KeyboardInterrupt):
+            baseline.store(entries(run, "a", "b"), reason="second", now=NOW)
+    else:
+        baseline.store(entries(run, "a", "b"), reason="second", now=NOW)
+    monkeypatch.setattr(Path, "replace", replace)
+    assert len(baseline.names()) == 1 + after // 2 or after == 1
+    for name in baseline.names():
+        attached_files(baseline.recording(name))
+    baseline.store(entries(run, "a"), reason="third", now=NOW)
+    assert baseline.names() == ["a", "b"]
+    attached_files(baseline.recording("b"))
+    log = [json.loads(line) for line in (tmp_path / "accepted.jsonl").read_text().splitlines()]
+    assert [(line["reason"], list(line["scenarios"])) for line in log] == [
+        ("first", ["a"]),
+        ("second", ["a", "b"]),
+        ("third", ["a"]),
+    ]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a", "accepted.jsonl", "b", "objects"]
+
+
+def test_what_a_killed_acceptance_had_not_all_written_is_dropped(run, tmp_path):
+    (tmp_path / ".staging").mkdir()
+    (tmp_path / ".staging" / "b.mcap").write_bytes(b"half")
+    Baseline(tmp_path).store(entries(run, "a"), reason="first", now=NOW)
+    assert Baseline(tmp_path).names() == ["a"]
+    assert not (tmp_path / ".staging").exists()
 
 
 def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
