@@ -472,14 +472,16 @@ def test_a_night_that_was_cut_is_carried_on(tmp_path, capsys):
     assert run(["accept", str(out), "--baseline", str(base), "--yes"]) is ExitCode.INVALID
     before = {file: file.stat().st_mtime_ns for file in out.glob("*/*.mcap")}
     capsys.readouterr()
-    assert night(tmp_path, out, "--resume", "--rrd", "none") is ExitCode.DIFFERENT
+    assert night(tmp_path, out, "--resume", "--rrd", "none", "--timeout", "60s") is ExitCode.DIFFERENT
     assert capsys.readouterr().err.count(": reused") == 3
     assert {file: file.stat().st_mtime_ns for file in out.glob("*/*.mcap")} == before
     assert verdicts_of(out) == {"a": "same", "b": "different", "c": "same"}
     assert json.loads((out / "run.json").read_text())["interrupted"] is False
     assert len((out / "history.jsonl").read_text().splitlines()) == 2
     (out / "c" / "c.mcap").unlink()
-    assert night(tmp_path, out, "--resume", "--rrd", "all") is ExitCode.DIFFERENT  # now with recordings for eyes
+    assert (
+        night(tmp_path, out, "--resume", "--rrd", "all", "--timeout", "60s") is ExitCode.DIFFERENT
+    )  # now with recordings for eyes
     assert len(list(out.glob("*/?.rrd"))) == 3
     assert verdicts_of(out)["c"] == "same"
 
