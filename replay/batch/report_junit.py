@@ -11,6 +11,7 @@ from replay.batch.judged import Judged, Regression, Verdict
 from replay.comparison.report_junit import clean
 from replay.comparison.report_text import text
 from replay.comparison.runs import RunDifference
+from replay.errors import printable
 
 SUITE = "replay.regress"
 FAILURES = (Verdict.DIFFERENT, Verdict.BROKEN, Verdict.MISSING)
@@ -58,7 +59,7 @@ def junit(found: Regression) -> bytes:
 
 def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
     seconds = 0.0 if item.result is None else item.result.seconds
-    attributes = {"name": clean(item.name), "classname": SUITE, "time": f"{seconds:.3f}"}
+    attributes = {"name": printable(item.name), "classname": SUITE, "time": f"{seconds:.3f}"}
     case = ElementTree.SubElement(suite, "testcase", attributes)
     if item.verdict.left_out:
         ElementTree.SubElement(case, "skipped", {"message": clean(item.message)})

@@ -50,7 +50,7 @@ def _details(found: RunDifference, case: Case) -> str:
 
 
 def _case(suite: ElementTree.Element, name: str) -> ElementTree.Element:
-    attributes = {"name": clean(name), "classname": SUITE, "time": "0"}
+    attributes = {"name": printable(name), "classname": SUITE, "time": "0"}
     return ElementTree.SubElement(suite, "testcase", attributes)
 
 

@@ -111,8 +111,11 @@ def test_of_run_folders_what_their_last_run_made_is_compared(folders, tmp_path, 
         ("{", "run.json: is not one that replay wrote"),
         ('{"scenarios": {"same": 3}}', "run.json: is not one that replay wrote"),
         ("[" * 100_000, "run.json: is not one that replay wrote"),
-        ('{"scenarios": {"../a/same": {"status": "passed"}}}', "'../a/same' is no scenario's name"),
-        ('{"scenarios": {"same": {"status": "interrupted"}}}', "its run.json lists no recording"),
+        (
+            '{"scenarios": {"../a/same": {"status": "passed"}}, "interrupted": false}',
+            "'../a/same' is no scenario's name",
+        ),
+        ('{"scenarios": {"same": {"status": "interrupted"}}, "interrupted": true}', "its run.json lists no recording"),
     ],
 )
 def test_a_run_json_of_another_kind_is_one_line(folders, tmp_path, run, text, message):

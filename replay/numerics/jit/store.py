@@ -47,13 +47,13 @@ def directory() -> Path | None:
     for base in _candidate_bases():
         try:
             base.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _try_to_write(base)
             others = _who_else_writes(base)
-            if others is None:
-                _try_to_write(base)
-                return base.resolve()
         except OSError as error:
             reason = f"{base}: {error.strerror or error}"
             continue
+        if others is None:
+            return base.resolve()
         reason = f"{base}: {others}"
         progress.remark(f"compiled kernels are not kept in {reason}")
     progress.unkept(reason)
