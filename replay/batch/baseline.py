@@ -66,10 +66,10 @@ class Baseline:
             for place in (OBJECTS, LOG, STAGING, *entries):
                 refuse_link(self.directory / place)
             try:
-                self._put_in_place()
+                if line := self._staged_line():
+                    self._put_in_place(line)
                 shutil.rmtree(self._staging, ignore_errors=True)
-                self._stage(entries, reason, now)
-                self._put_in_place()
+                self._put_in_place(self._stage(entries, reason, now))
             except OSError as error:
                 raise write_error(self.directory, error) from None
             finally:
@@ -87,12 +87,12 @@ class Baseline:
         """Return the line for the log when all that is to be put in place is staged, else ""."""
         file = self._staging / LOG
         try:
-            return "" if file.is_symlink() else json_line(read_json_file(file))
+            return "" if file.is_symlink() else json_line(read_json_file(file, surrogates=True))
         except (OSError, ValueError):
             return ""
 
-    def _stage(self, entries: Mapping[str, Entry], reason: str, now: datetime.datetime) -> None:
-        """Write all that is to be put in place, and the line for the log last."""
+    def _stage(self, entries: Mapping[str, Entry], reason: str, now: datetime.datetime) -> str:
+        """Write all that is to be put in place, and the line for the log last; return that."""
         self._staging.mkdir()
         codes: set[str] = set()
         for name, entry in entries.items():
@@ -103,22 +103,21 @@ class Baseline:
                 codes.add(read_provenance(log).code)
         for name in entries:
             self._path(name).parent.mkdir(exist_ok=True)
-        line = {
+        said = {
             "time": now.isoformat(timespec="seconds"),
             "reason": reason,
             "code": sorted(codes),
             "scenarios": {name: entry.what for name, entry in entries.items()},
         }
-        write_file(self._staging / LOG, json_line(line) + "\n")
+        line = json_line(said)
+        write_file(self._staging / LOG, f"{line}\n")
+        return line
 
-    def _put_in_place(self) -> None:
-        """Do what is staged, or the rest of it; nothing when not all of it is.
+    def _put_in_place(self, line: str) -> None:
+        """Do what is staged, or the rest of it.
 
         It may be of another process, so that it is looked at like everything that others have written.
         """
-        line = self._staged_line()
-        if not line:
-            return
         staged = sorted(self._staging.glob("*.mcap"))
         for file in staged:
             check_name(file.stem)

@@ -52,4 +52,4 @@ def read_result(path: Path) -> WrittenResult:
 
 def read_night(line: str) -> WrittenNight:
     """Return what a line of a history says; ValueError when it is none that replay wrote."""
-    return typed(read_json(line), WrittenNight)
+    return typed(read_json(line, surrogates=True), WrittenNight)

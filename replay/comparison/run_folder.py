@@ -30,7 +30,7 @@ class WrittenRun(TypedDict):
 
 def read_run(folder: Path) -> WrittenRun:
     """Return what a run folder's run.json says; OSError or ValueError when there is none that replay wrote."""
-    return typed(read_json_file(folder / RUN), WrittenRun)
+    return typed(read_json_file(folder / RUN, surrogates=True), WrittenRun)
 
 
 def recordings_in(folder: Path) -> dict[str, Path]:

@@ -69,9 +69,9 @@ def test_what_and_why_is_logged_and_unneeded_meshes_go(run, tmp_path):
     baseline = Baseline(tmp_path)
     baseline.store(entries(run, "a"), reason="first", now=NOW)
     (tmp_path / "objects" / ("0" * 64)).write_bytes(b"left over")
-    baseline.store(entries(run, "a"), reason="näher", now=NOW)
+    baseline.store(entries(run, "a"), reason="näher \udcff", now=NOW)
     log = [json.loads(line) for line in (tmp_path / "accepted.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert [line["reason"] for line in log] == ["first", "näher"]
+    assert [line["reason"] for line in log] == ["first", "näher \udcff"]
     assert log[1]["scenarios"] == {"a": "new"}
     assert len(list((tmp_path / "objects").iterdir())) == 1
     assert not list(tmp_path.glob(".staging*"))
@@ -160,10 +160,12 @@ def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
     ):
         failing = frozenset(name for name, verdict in verdicts.items() if verdict != "same")
         append_night(path, Night(f"day {day}", "1", verdicts, failing))
+    append_night(path, Night("day 5", "1", {"\udcff": "failed"}, frozenset(["\udcff"])))
     with path.open("a") as file:
         file.write('{"time": "cut')
     nights = read_history(path)
-    assert len(nights) == 5
+    assert len(nights) == 6
+    assert failing_since(nights, "\udcff") == "day 5"
     assert failing_since(nights, "a") == "day 2"
     assert failing_since(nights, "b") is None
     assert failing_since([], "a") is None
