@@ -150,6 +150,16 @@ class NoSpaceError(WriteError):
     """A file cannot be written because no room is left, which ends everything that writes there."""
 
 
+class BusyError(WriteError):
+    """A folder is in use by another command, which is named."""
+
+    def __init__(self, file: str, user: str) -> None:
+        ReplayError.__init__(self, f"{file}: is in use by {user}; wait until that has ended, or choose another folder")
+        self.file = file
+        self.user = user
+        self.reason = f"it is in use by {user}"
+
+
 class WorkerError(ReplayError):
     """Worker processes cannot be used: they die before they have begun."""
 

@@ -6,6 +6,7 @@ import functools
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from replay import limits
@@ -15,12 +16,13 @@ _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 Value = TypeVar("Value")
 
 
-def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES) -> Any:
+def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES, surrogates: bool = False) -> Any:
     """Return what a JSON text holds.
 
     Args:
         text: in UTF-8.
         most: its largest size [bytes].
+        surrogates: take halves of surrogate pairs too: names of files that are no text hold them.
 
     Raises:
         ValueError: it is no JSON, or more or deeper than is read; its text is one line.
@@ -33,7 +35,7 @@ def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES) -> Any:
         raise ValueError(f"it has {groups} lists and objects; at most {limits.JSON_GROUPS} are read")
     try:
         value = json.loads(text)
-        if _SURROGATE.search(data):
+        if not surrogates and _SURROGATE.search(data):
             json.dumps(value, ensure_ascii=False).encode()
         return value
     except UnicodeEncodeError:
@@ -46,6 +48,18 @@ def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES) -> Any:
         raise ValueError("a number in it is too long") from None
     except RecursionError:
         raise ValueError("its lists and objects are nested too deeply") from None
+
+
+def read_json_file(path: Path, *, surrogates: bool = False) -> Any:
+    """Return what a file of JSON beside recordings holds; OSError or ValueError when there is none.
+
+    What is no plain file, such as a pipe, is none. `surrogates` as of `read_json`.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(str(path))
+    if path.stat().st_size > limits.RECORD_JSON:
+        raise ValueError(f"it has more than {limits.RECORD_JSON} bytes")
+    return read_json(path.read_bytes(), surrogates=surrogates)
 
 
 def typed(value: Any, type_: Callable[..., Value]) -> Value:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from replay.batch.baseline import Baseline, Entry, check_name, check_scenario
 from replay.batch.case import Status
-from replay.batch.written import read_run
 from replay.comparison import wording
 from replay.comparison.difference import Difference, Verdict
 from replay.comparison.provenance import FILES
+from replay.comparison.run_folder import read_run
 from replay.comparison.runs import diff
 from replay.errors import InvalidValue, RecordingError
 

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import os
 import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from replay.batch.claim import claim
 from replay.errors import InvalidValue, RecordingError
+from replay.json_text import read_json_file
 from replay.language.fields import is_title
 from replay.logs.mcap_reader import McapLog
-from replay.logs.part_file import append_lines, json_line, refuse_link, write_error
+from replay.logs.part_file import append_lines, json_line, refuse_link, write_error, write_file
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, is_digest, write_slim
 
 LOG = "accepted.jsonl"
+STAGING = ".staging"
+"""Name of the folder in which recordings are written before they are put in place."""
 
 
 @dataclass(frozen=True)
@@ -47,62 +51,87 @@ class Baseline:
         """Store recordings by scenario and append what and why to the log.
 
         All are written first and put in place then, each in one step: at any moment every baseline is wholly the old
-        one or wholly the new one. Meshes that nothing needs any more are removed; nothing outside the folder is.
+        one or wholly the new one. What was all written when a process was killed is put in place by the next one that
+        stores. Meshes that nothing needs any more are removed; nothing outside the folder is.
 
         Raises:
+            BusyError: another process writes the folder.
             InvalidValue: a scenario's name is none; nothing is changed then.
             RecordingError: a recording cannot be read, or is of another scenario; nothing is changed then.
             WriteError: the folder cannot be written, or a place in it is a link.
         """
         for name in entries:
             check_name(name)
-        for place in (OBJECTS, LOG, *entries):
-            refuse_link(self.directory / place)
-        new, stored = not self.directory.exists(), False
+        with claim(self.directory):
+            for place in (OBJECTS, LOG, STAGING, *entries):
+                refuse_link(self.directory / place)
+            try:
+                if line := self._staged_line():
+                    self._put_in_place(line)
+                shutil.rmtree(self._staging, ignore_errors=True)
+                self._put_in_place(self._stage(entries, reason, now))
+            except OSError as error:
+                raise write_error(self.directory, error) from None
+            finally:
+                if not self._staged_line():
+                    shutil.rmtree(self._staging, ignore_errors=True)
+                self._remove_unneeded()
+                with contextlib.suppress(OSError):
+                    (self.directory / OBJECTS).rmdir()
+
+    @property
+    def _staging(self) -> Path:
+        return self.directory / STAGING
+
+    def _staged_line(self) -> str:
+        """Return the line for the log when all that is to be put in place is staged, else ""."""
+        file = self._staging / LOG
         try:
-            self.directory.mkdir(parents=True, exist_ok=True)
-            staging = Path(tempfile.mkdtemp(prefix=".staging-", dir=self.directory))
-        except OSError as error:
-            raise write_error(self.directory, error) from None
-        try:
-            staged: dict[str, Path] = {}
-            codes: set[str] = set()
-            for name, entry in entries.items():
-                staged[name] = staging / f"{len(staged)}.mcap"
-                check_scenario(entry.recording, name)
-                write_slim(entry.recording, staged[name], self.directory / OBJECTS)
-                with McapLog(staged[name]) as log:
-                    codes.add(read_provenance(log).code)
-            for name, file in staged.items():
-                self._path(name).parent.mkdir(exist_ok=True)
-                file.replace(self._path(name))
-            line = {
-                "time": now.isoformat(timespec="seconds"),
-                "reason": reason,
-                "code": sorted(codes),
-                "scenarios": {name: entry.what for name, entry in entries.items()},
-            }
-            append_lines(self.directory / LOG, [json_line(line)])
-            stored = True
-        except OSError as error:
-            raise write_error(self.directory, error) from None
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
-            if not stored:
-                self._undo(new)
-        self._remove_unneeded()
+            return "" if file.is_symlink() else json_line(read_json_file(file, surrogates=True))
+        except (OSError, ValueError):
+            return ""
+
+    def _stage(self, entries: Mapping[str, Entry], reason: str, now: datetime.datetime) -> str:
+        """Write all that is to be put in place, and the line for the log last; return that."""
+        self._staging.mkdir()
+        codes: set[str] = set()
+        for name, entry in entries.items():
+            staged = self._staging / f"{name}.mcap"
+            check_scenario(entry.recording, name)
+            write_slim(entry.recording, staged, self.directory / OBJECTS)
+            with McapLog(staged) as log:
+                codes.add(read_provenance(log).code)
+        for name in entries:
+            self._path(name).parent.mkdir(exist_ok=True)
+        said = {
+            "time": now.isoformat(timespec="seconds"),
+            "reason": reason,
+            "code": sorted(codes),
+            "scenarios": {name: entry.what for name, entry in entries.items()},
+        }
+        line = json_line(said)
+        write_file(self._staging / LOG, f"{line}\n")
+        return line
+
+    def _put_in_place(self, line: str) -> None:
+        """Do what is staged, or the rest of it.
+
+        It may be of another process, so that it is looked at like everything that others have written.
+        """
+        staged = sorted(self._staging.glob("*.mcap"))
+        for file in staged:
+            check_name(file.stem)
+            check_scenario(file, file.stem)
+            refuse_link(self.directory / file.stem)
+        log = self.directory / LOG
+        if not _ends_in(log, f"{line}\n".encode()):
+            append_lines(log, [line])
+        for file in staged:
+            file.replace(self._path(file.stem))
+        (self._staging / LOG).unlink()
 
     def _path(self, name: str) -> Path:
         return self.directory / name / f"{name}.mcap"
-
-    def _undo(self, new: bool) -> None:
-        """Remove the meshes of recordings that were not stored, and the folders that are empty without them."""
-        self._remove_unneeded()
-        with contextlib.suppress(OSError):
-            (self.directory / OBJECTS).rmdir()
-        if new:
-            with contextlib.suppress(OSError):
-                self.directory.rmdir()
 
     def _remove_unneeded(self) -> None:
         """Remove the meshes that no recording needs; all stay when one cannot be read, which may need any.
@@ -112,9 +141,9 @@ class Baseline:
         if (self.directory / OBJECTS).is_symlink():
             return
         needed: set[str] = set()
-        for name in self.names():
+        for recording in (*map(self._path, self.names()), *self._staging.glob("*.mcap")):
             try:
-                with McapLog(self._path(name)) as log:
+                with McapLog(recording) as log:
                     needed.update(read_provenance(log).files.values())
             except RecordingError:
                 return
@@ -122,6 +151,14 @@ class Baseline:
             if file.name not in needed and is_digest(file.name) and file.is_file() and not file.is_symlink():
                 with contextlib.suppress(OSError):
                     file.unlink()
+
+
+def _ends_in(file: Path, data: bytes) -> bool:
+    if not file.is_file():
+        return False
+    with file.open("rb") as stream:
+        stream.seek(max(stream.seek(0, os.SEEK_END) - len(data), 0))
+        return stream.read() == data
 
 
 def check_name(name: str) -> None:

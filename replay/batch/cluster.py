@@ -73,6 +73,7 @@ class Cluster:
         follow: called with (name, 0, 0) when a task is handed over.
         tell: called with remarks for the user.
         check: called about ten times a second; what it raises ends the run.
+        undisturbed: as of `Pool`.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Cluster:
         follow: Callable[[str, int, int], None] = lambda name, done, total: None,
         tell: Callable[[str], None] = lambda text: None,
         check: Callable[[], None] = lambda: None,
+        undisturbed: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
     ) -> None:
         self._address = address
         self._certificates = certificates
@@ -94,6 +96,7 @@ class Cluster:
         self._follow = follow
         self._tell = tell
         self._check = check
+        self._undisturbed = undisturbed
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -102,7 +105,11 @@ class Cluster:
             WorkerError: the scheduler does not answer.
             NoSpaceError: the disk is too full for a file that came back.
         """
-        with _librarys_log_silent(), contextlib.closing(self._connect()) as client:
+        with (
+            _librarys_log_silent(),
+            contextlib.closing(self._connect()) as client,
+            self._undisturbed(),
+        ):
             crew = _Crew(client, self._tell)
             executor = client.get_executor(pure=False)
             ordered = sorted(tasks, key=lambda task: (-task.cost, task.name))
@@ -228,11 +235,12 @@ def _unpacked(task: Task, future: Any) -> Ended:
         return Ended(task, Ending.CRASHED, None, f"on the cluster: {reason}", 0.0, 0)
     folder = task.payload.folder
     try:
-        for name, data in parcel.files.items():
+        (folder / f"{task.name}.rrd").unlink(missing_ok=True)  # so that at no moment it stands beside another's log
+        for name, data in sorted(parcel.files.items()):
             write_file(folder / Path(name).name, data)
     except NoSpaceError:
         raise
-    except WriteError as error:
+    except (WriteError, OSError) as error:
         return Ended(task, Ending.CRASHED, None, str(error), parcel.ended.seconds, parcel.ended.memory)
     value = parcel.ended.value
     if isinstance(value, CaseResult):

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.batch.case import CaseResult
-from replay.batch.run import Run
+from replay.batch.run_file import Run
 from replay.comparison.plots import Plot
 from replay.comparison.runs import Case
 
 INDEX, JUNIT = "index.html", "junit.xml"
 """Names of the reports in a run folder."""
-LOG = "log.txt"
-"""Name of the file in a scenario's folder that holds what it said."""
 OVERLAY = "{name}.difference.rrd"
 """Name of the recording that shows both runs of a scenario."""
 

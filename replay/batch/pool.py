@@ -8,7 +8,6 @@ the work of it; no time limit counts before a worker is ready.
 from __future__ import annotations
 
 import contextlib
-import enum
 import os
 import pickle
 import queue
@@ -19,12 +18,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import psutil
 
+from replay.batch.memory import Peak
+from replay.batch.task import Ended, Ending, Task
 from replay.batch.worker import (
     Advanced,
     Divisible,
@@ -40,59 +41,14 @@ from replay.batch.worker import (
 )
 from replay.errors import InvalidValue, WorkerError
 
+__all__ = ["Ended", "Ending", "Pool", "Task"]
+
 T = TypeVar("T")
 
 _SECONDS_BETWEEN_CHECKS = 0.1
 _SECONDS_TO_PREPARE = 1800.0  # compiling everything takes minutes on a slow machine; beyond this it hangs
 _FAILED_STARTS = 3
 _BEGIN = "import sys; sys.path[:] = sys.argv[1:]; from replay.batch.worker import main; main()"
-
-
-class Ending(enum.Enum):
-    """How a task ended."""
-
-    DONE = "done"
-    CRASHED = "crashed"
-    TIMEOUT = "timeout"
-    MEMORY = "memory"
-
-
-@dataclass(frozen=True)
-class Task:
-    """One thing to do.
-
-    Attributes:
-        name: in messages.
-        payload: what the work is called with; it is pickled.
-        cost: how long it is expected to take, in any unit; the longest begin first.
-        log: file that gets what the task prints.
-    """
-
-    name: str
-    payload: Any
-    cost: float = 1.0
-    log: Path | None = None
-
-
-@dataclass(frozen=True)
-class Ended:
-    """What became of a task.
-
-    Attributes:
-        task: which.
-        ending: how it ended.
-        value: what the work returned when it was done, else None.
-        reason: one line that says why there is no value; "" when it was done.
-        seconds: wall time.
-        memory: the most resident memory seen [bytes]; 0 when it was too quick to be seen.
-    """
-
-    task: Task
-    ending: Ending
-    value: Any
-    reason: str
-    seconds: float
-    memory: int
 
 
 class Pool:
@@ -109,6 +65,8 @@ class Pool:
         tell: called with remarks for the user.
         preparing: called with how far the preparation of workers is.
         check: called all the time, at least about ten times a second; what it raises ends the run and all processes.
+        undisturbed: returns a context in which a request to end the run waits for `check`, so that no result is lost.
+        inherit: descriptors that the workers keep open as long as they live.
 
     Raises:
         InvalidValue: a limit or the number of workers is not positive.
@@ -127,6 +85,8 @@ class Pool:
         tell: Callable[[str], None] = lambda text: None,
         preparing: Callable[[Any], None] = lambda state: None,
         check: Callable[[], None] = lambda: None,
+        undisturbed: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
+        inherit: Sequence[int] = (),
     ) -> None:
         for name, value in (("workers", workers), ("timeout", timeout), ("memory", memory)):
             if value is not None and value <= 0:
@@ -140,6 +100,8 @@ class Pool:
         self._tell = tell
         self._preparing = preparing
         self._check = check
+        self._undisturbed = undisturbed
+        self._inherit = inherit
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -147,7 +109,10 @@ class Pool:
         Raises:
             WorkerError: workers die before they are ready.
         """
-        waiting = deque(sorted(tasks, key=lambda task: (-task.cost, task.name)))
+        with self._undisturbed():
+            yield from self._run(deque(sorted(tasks, key=lambda task: (-task.cost, task.name))))
+
+    def _run(self, waiting: deque[Task]) -> Generator[Ended]:
         inbox: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
         workers: list[_Worker] = []
         prepared = False
@@ -160,15 +125,15 @@ class Pool:
                 self._check()
                 wanted = min(self._count, len(waiting) + sum(worker.task is not None for worker in workers))
                 while len(workers) < (wanted if prepared else preparing):
-                    workers.append(_Worker(self._start, inbox))
+                    workers.append(_Worker(self._start, inbox, self._inherit))
                 spare = [worker for worker in workers if worker.task is None] if prepared else []
                 for worker in sorted(spare, key=lambda worker: worker.ready)[: max(0, len(workers) - wanted)]:
                     workers.remove(worker)
                     worker.stop()
                 for worker in workers:
                     if worker.ready and worker.task is None and waiting:
+                        self._follow(waiting[0].name, 0, 0)
                         worker.give(waiting.popleft())
-                        self._follow(_known(worker.task).name, 0, 0)
                 with contextlib.suppress(queue.Empty):
                     worker, message = inbox.get(timeout=_SECONDS_BETWEEN_CHECKS)
                     if worker not in workers:
@@ -187,10 +152,19 @@ class Pool:
                             failed_starts = 0
                         case Advanced(done, total):
                             self._follow(_known(worker.task).name, done, total)
-                        case Finished(value):
-                            yield worker.ended(Ending.DONE, value=value)
-                        case Raised(text):
-                            yield worker.ended(Ending.CRASHED, text)
+                        case Finished(_, peak) | Raised(_, peak):
+                            excess = worker.excess(peak, self._memory)
+                            if excess == "":
+                                name = _known(worker.task).name
+                                self._tell(f"{name}: it was over before its memory could be watched")
+                            if excess:
+                                workers.remove(worker)
+                                worker.stop()
+                                yield worker.ended(Ending.MEMORY, excess)
+                            elif isinstance(message, Raised):
+                                yield worker.ended(Ending.CRASHED, message.text)
+                            else:
+                                yield worker.ended(Ending.DONE, value=message.value)
                         case None:
                             workers.remove(worker)
                             worker.stop()
@@ -218,7 +192,9 @@ class Pool:
 class _Worker:
     """A worker process as the pool sees it."""
 
-    def __init__(self, start: Start, inbox: queue.SimpleQueue[tuple[_Worker, Any]]) -> None:
+    def __init__(
+        self, start: Start, inbox: queue.SimpleQueue[tuple[_Worker, Any]], inherit: Sequence[int] = ()
+    ) -> None:
         self.task: Task | None = None
         self.ready = False
         self._memory = 0
@@ -229,6 +205,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            pass_fds=inherit,
             start_new_session=True,  # Ctrl-C is for the pool, which then ends its workers itself
         )
         self._watched = psutil.Process(self._process.pid)
@@ -255,13 +232,20 @@ class _Worker:
         used = self._resident()
         self._memory = max(self._memory, used)
         if memory is not None and used > (memory if self.task else memory / 2):
-            return (
-                Ending.MEMORY,
-                f"stopped: {used / 2**20:.0f} MiB of memory are above the limit {memory / 2**20:.0f} MiB",
-            )
+            return Ending.MEMORY, _above(used, memory)
         if self.task and timeout is not None and seconds > timeout:
             return Ending.TIMEOUT, f"stopped: still running after the time limit of {timeout:g} s"
         return None
+
+    def excess(self, peak: Peak, memory: int | None) -> str | None:
+        """Return how a task that is over was beyond the limit; None when it was not, "" when nobody can know."""
+        if peak.sure:
+            self._memory = max(self._memory, peak.bytes)
+        if memory is None or peak.bytes <= memory:
+            return None
+        if peak.sure:
+            return _above(peak.bytes, memory)
+        return None if self._memory else ""
 
     def stop(self) -> None:
         """End the process and all that it started, and wait until they are gone."""
@@ -307,7 +291,7 @@ class _Worker:
 
     def _listen(self, inbox: queue.SimpleQueue[tuple[_Worker, Any]]) -> None:
         stream = _known(self._process.stdout)
-        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError), stream:
+        with contextlib.suppress(Exception), stream:  # its end, or what cannot be unpickled: it is of no use then
             while True:
                 inbox.put((self, pickle.load(stream)))
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -331,6 +315,10 @@ def import_path(work: Work) -> list[str]:
         found = [here if folder == "" else folder for folder in sys.path]
         return [folder for folder in found if os.path.realpath(folder) != here or here in homes]
     return [folder for folder in sys.path if folder]
+
+
+def _above(used: int, memory: int) -> str:
+    return f"stopped: {used / 2**20:.0f} MiB of memory are above the limit {memory / 2**20:.0f} MiB"
 
 
 def _known(value: T | None) -> T:

@@ -4,33 +4,42 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import datetime
 import shutil
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from replay.batch.baseline import Baseline, Entry
+from replay.batch.baseline import Baseline
 from replay.batch.case import CaseResult, Status
+from replay.batch.case_folder import LOG
+from replay.batch.claim import claim
+from replay.batch.create import create_baselines, recording_of
 from replay.batch.drawings import Album
 from replay.batch.history import check_history
 from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, Verdict
-from replay.batch.run import Execution, Run, run_all
+from replay.batch.run import Execution, run_all
+from replay.batch.run_file import Run
 from replay.batch.select import Selection
 from replay.batch.watch import Unwatched, Watch
 from replay.comparison import wording
 from replay.comparison.difference import Verdict as DiffVerdict
 from replay.comparison.log_changes import same_messages
 from replay.comparison.overlay import write_overlay
-from replay.comparison.plots import Plot, plots
+from replay.comparison.plots import plots
 from replay.comparison.rules import Rules
 from replay.comparison.runs import Case, Pair, diff_pair, read_pair
-from replay.errors import InvalidValue, NoSpaceError, RecordingError, WriteError, count
+from replay.errors import InvalidValue, NoSpaceError, RecordingError, ReplayError, count, printable
+from replay.logs.part_file import append_lines
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
 MissingBaseline = Literal["fail", "create", "skip"]
 Rrd = Literal["failing", "all", "none"]
+_AGAIN = ".rrd"
+"""Folder in which failing scenarios are recorded for eyes."""
+_KNOWN = (Verdict.SAME, Verdict.DIFFERENT, Verdict.CREATED, Verdict.MISSING, Verdict.UNCOMPARED)
+"""Verdicts beside which a broken expectation is what matters."""
 
 
 def regress(
@@ -45,10 +54,13 @@ def regress(
     model: Model | None = None,
     model_name: str = "",
     history: Path | None = None,
+    resume: bool = False,
     execution: Execution | None = None,
     watch: Watch | None = None,
 ) -> Regression:
     """Run the chosen scenarios into a folder and compare each with its baseline; nothing of an earlier run is kept.
+
+    Until the reports are written, run.json says that the run was interrupted.
 
     Args:
         selection: what to run, and what was filtered out.
@@ -61,9 +73,11 @@ def regress(
         model: replaces the scenarios' own models.
         model_name: how the user named it, for reports.
         history: file that the reports will append to, to find out now that it cannot be.
+        resume: keep the results of an earlier run that are still valid, such as those of a night that was cut.
         execution, watch: as of `run_all`.
 
     Raises:
+        BusyError: another process writes the run folder.
         InvalidValue: the baseline is a file.
         WriteError: a folder cannot be written.
         WorkerError: worker processes cannot be started.
@@ -71,37 +85,42 @@ def regress(
     if baseline.is_file():
         raise InvalidValue("--baseline", baseline, "is a file; give the folder that `replay accept` writes")
     check_history(history)
-    accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
-    _forget(directory, [*(scenario.name for scenario in selection.chosen), *selection.invalid])
-    run = run_all(
-        selection.chosen,
-        directory,
-        model=model,
-        rrd=rrd == "all",
-        overwrite=True,
-        failed=selection.failed,
-        execution=execution,
-        watch=watch,
-    )
-    if run.interrupted:
-        watch = Unwatched()  # it has told its request; another one ends the comparison too
-    judged: dict[str, Judged] = {}
-    album = Album()
-    ran = list(zip(selection.chosen, run.results, strict=False))  # those that failed before come after these
-    try:
-        for scenario, result in ran:
-            watch.compare(scenario.name)
-            item = _judge(scenario, result, accepted, rules, missing, overlay=rrd != "none")
-            judged[scenario.name] = album.keep(item)
-        judged |= _created(judged, accepted)
-        if rrd == "failing" and not run.interrupted:
-            failing = {j.name for j in judged.values() if not j.verdict.fine and j.result and j.result.status.recorded}
-            _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
-    except KeyboardInterrupt:
-        run = dataclasses.replace(run, interrupted=True)
-    for name in [name for name, item in judged.items() if item.verdict is Verdict.CREATED]:
-        if accepted.recording(name) is None:  # ended before it was stored
-            del judged[name]
+    with claim(directory):
+        accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
+        names = [*(scenario.name for scenario in selection.chosen), *selection.invalid]
+        _forget(directory, names, drawings=not (resume and rrd == "all"))
+        run = run_all(
+            selection.chosen,
+            directory,
+            model=model,
+            rrd=rrd == "all",
+            overwrite=not resume,
+            resume=resume,
+            whole=False,
+            failed=selection.failed,
+            execution=execution,
+            watch=watch,
+        )
+        if run.interrupted:
+            watch = Unwatched()  # it has told its request; another one ends the comparison too
+        judged: dict[str, Judged] = {}
+        album = Album()
+        ran = list(zip(selection.chosen, run.results, strict=False))  # those that failed before come after these
+        try:
+            for scenario, result in ran:
+                watch.compare(scenario.name)
+                item = _judge(scenario.name, result, accepted, rules, missing, overlay=rrd != "none")
+                judged[scenario.name] = album.keep(item)
+            with watch.undisturbed():
+                judged |= create_baselines(judged, accepted)
+            if rrd == "failing" and not run.interrupted:
+                attention = [item for item in judged.values() if not item.verdict.fine]
+                failing = {item.name for item in attention if item.result and item.result.status.recorded}
+                _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
+        except KeyboardInterrupt:
+            run = dataclasses.replace(run, interrupted=True)
+            unstored = [name for name, item in judged.items() if item.verdict is Verdict.CREATED and not item.message]
+            judged = {name: item for name, item in judged.items() if name not in unstored}
     ended = [judged.get(scenario.name) or _unjudged(scenario.name, result) for scenario, result in ran]
     ended += [_unjudged(result.name, result) for result in selection.failed]
     ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
@@ -116,20 +135,22 @@ def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
     if item.verdict is not Verdict.MISSING:
         return item
     for name in unused:
-        with contextlib.suppress(RecordingError):
-            if same_messages(accepted.directory / name / f"{name}.mcap", _mcap(item)):
+        with contextlib.suppress(Exception):  # whatever is odd about that one
+            if same_messages(accepted.directory / name / f"{name}.mcap", recording_of(item)):
                 message = f"{item.message}; the unused baseline {name} has exactly the same readings: renamed?"
                 return dataclasses.replace(item, message=message)
     return item
 
 
-def _forget(directory: Path, names: Sequence[str]) -> None:
+def _forget(directory: Path, names: Sequence[str], *, drawings: bool) -> None:
     """Remove an earlier night's reports and pictures, which would stand beside recordings of this one."""
     own = [name for name in names if not (directory / name).is_symlink()]
-    shown = [directory / name / kind.format(name=name) for name in own for kind in ("{name}.rrd", OVERLAY)]
+    kinds = ("{name}.rrd", OVERLAY) if drawings else (OVERLAY,)
+    shown = [directory / name / kind.format(name=name) for name in own for kind in kinds]
     for file in (directory / JUNIT, directory / INDEX, *shown):
         with contextlib.suppress(OSError):
             file.unlink(missing_ok=True)
+    shutil.rmtree(directory / _AGAIN, ignore_errors=True)
 
 
 def _unused(selection: Selection, accepted: Baseline, told: set[str]) -> list[str]:
@@ -137,6 +158,32 @@ def _unused(selection: Selection, accepted: Baseline, told: set[str]) -> list[st
     sweeps = tuple(f"{name}[" for name in selection.invalid)
     names = accepted.names() if selection.of_folders else []
     return [name for name in names if name not in told and not name.startswith(sweeps)]
+
+
+def _judge(
+    name: str, result: CaseResult, baseline: Baseline, rules: Rules, missing: MissingBaseline, *, overlay: bool
+) -> Judged:
+    """Return the verdict of one scenario.
+
+    Args:
+        name: of the scenario.
+        result: of its run.
+        baseline: where its accepted recording may be.
+        rules: tolerances.
+        missing: what it is without one; `CREATED` says that one is still to be stored.
+        overlay: whether to write a recording that shows both runs when they differ.
+
+    Raises:
+        NoSpaceError: the disk is full.
+    """
+    if not result.status.recorded or result.recordings is None:
+        return _unjudged(name, result)
+    found = _compared(name, result, baseline, rules, missing, overlay=overlay)
+    if result.status is Status.BROKEN and found.verdict in _KNOWN:
+        broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
+        message = "; ".join([*broken, *([found.message] if found.message else [])])
+        return dataclasses.replace(found, verdict=Verdict.BROKEN, message=message)
+    return found
 
 
 def _unjudged(name: str, result: CaseResult) -> Judged:
@@ -147,70 +194,55 @@ def _unjudged(name: str, result: CaseResult) -> Judged:
     return Judged(name, Verdict(result.status.value), result.error, result)
 
 
-def _created(judged: Mapping[str, Judged], accepted: Baseline) -> dict[str, Judged]:
-    """Store the baselines that are to be created; return the scenarios whose baseline cannot be."""
-    created = {name: Entry(_mcap(item), "new") for name, item in judged.items() if item.verdict is Verdict.CREATED}
-    try:
-        if created:
-            reason = "created by regress --missing-baseline create"
-            accepted.store(created, reason=reason, now=datetime.datetime.now(datetime.UTC))
-    except NoSpaceError:
-        raise
-    except WriteError as error:
-        return {
-            name: dataclasses.replace(judged[name], verdict=Verdict.MISSING, message=str(error)) for name in created
-        }
-    return {}
-
-
-def _judge(
-    scenario: Scenario,
-    result: CaseResult,
-    baseline: Baseline,
-    rules: Rules,
-    missing: MissingBaseline,
-    *,
-    overlay: bool,
+def _compared(
+    name: str, result: CaseResult, baseline: Baseline, rules: Rules, missing: MissingBaseline, *, overlay: bool
 ) -> Judged:
-    if not result.status.recorded or result.recordings is None:
-        return _unjudged(scenario.name, result)
-    accepted = baseline.recording(scenario.name)
-    verdict, message = Verdict.SAME, ""
-    comparison: Case | None = None
-    drawings: tuple[Plot, ...] = ()
+    assert result.recordings is not None
+    accepted, candidate = baseline.recording(name), result.recordings.mcap
     if accepted is None:
-        verdict, message = {
-            "fail": (Verdict.MISSING, f"{baseline.directory} holds no baseline of it"),
-            "create": (Verdict.CREATED, "its baseline is new"),
-            "skip": (Verdict.UNCOMPARED, f"{baseline.directory} holds no baseline of it"),
-        }[missing]
-    else:
-        try:
-            pair = read_pair(accepted, result.recordings.mcap, rules=rules)
-        except RecordingError as error:
-            verdict, message = Verdict.UNREADABLE, str(error)
-        else:
-            found = diff_pair(pair, rules=rules)
-            comparison = Case(scenario.name, accepted, result.recordings.mcap, found)
-            if found.verdict is DiffVerdict.DIFFERENT:
-                verdict, message, drawings = Verdict.DIFFERENT, wording.summary(found), plots(found, pair)
-                if overlay:
-                    message += _overlay(result.recordings.mcap.parent, comparison, pair)
-    if result.status is Status.BROKEN and verdict is not Verdict.UNREADABLE:
-        broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
-        verdict, message = Verdict.BROKEN, "; ".join([*broken, *([message] if message else [])])
-    return Judged(scenario.name, verdict, message, result, comparison, drawings)
+        verdicts = {"fail": Verdict.MISSING, "create": Verdict.CREATED, "skip": Verdict.UNCOMPARED}
+        message = "" if missing == "create" else f"{baseline.directory} holds no baseline of it"
+        return Judged(name, verdicts[missing], message, result)
+    try:
+        pair = read_pair(accepted, candidate, rules=rules)
+        found = diff_pair(pair, rules=rules)
+    except RecordingError as error:
+        ours = error.file == str(candidate)
+        verdict = Verdict.FAILED if ours else Verdict.UNREADABLE
+        return Judged(name, verdict, f"its own recording: {error}" if ours else str(error), result)
+    except Exception as error:
+        return Judged(name, Verdict.FAILED, _odd("it cannot be compared with its baseline", error, candidate), result)
+    comparison = Case(name, accepted, candidate, found)
+    if found.verdict is not DiffVerdict.DIFFERENT:
+        return Judged(name, Verdict.SAME, "", result, comparison)
+    message = wording.summary(found)
+    item = Judged(name, Verdict.DIFFERENT, message, result, comparison)
+    try:
+        item = dataclasses.replace(item, drawings=plots(found, pair))
+    except Exception as error:
+        item = dataclasses.replace(item, message=f"{message}; {_odd('it cannot be drawn', error, candidate)}")
+    return dataclasses.replace(item, message=item.message + _overlay(comparison, pair)) if overlay else item
 
 
-def _overlay(folder: Path, comparison: Case, pair: Pair) -> str:
+def _overlay(comparison: Case, pair: Pair) -> str:
     """Write the recording that shows both runs; return what to add to the message when that is not possible."""
     try:
-        write_overlay(folder / OVERLAY.format(name=comparison.name), comparison, pair)
+        write_overlay(comparison.candidate.with_name(OVERLAY.format(name=comparison.name)), comparison, pair)
     except NoSpaceError:
         raise
-    except WriteError as error:
-        return f"; {error}"
+    except Exception as error:
+        return f"; {_odd('both runs cannot be shown', error, comparison.candidate)}"
     return ""
+
+
+def _odd(what: str, error: Exception, candidate: Path) -> str:
+    """Return what went wrong as one line; of what nobody has foreseen, the log of the scenario gets the trace."""
+    if isinstance(error, ReplayError):
+        return str(error)
+    with contextlib.suppress(ReplayError):
+        trace = "".join(traceback.format_exception(error)).splitlines()
+        append_lines(candidate.with_name(LOG), map(printable, trace))
+    return f"{what}: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 class _Asked(Unwatched):
@@ -218,6 +250,7 @@ class _Asked(Unwatched):
 
     def __init__(self, watch: Watch) -> None:
         self.check = watch.check  # type: ignore[method-assign]
+        self.undisturbed = watch.undisturbed  # type: ignore[method-assign]
 
 
 def _show(
@@ -234,7 +267,7 @@ def _show(
     Raises:
         KeyboardInterrupt: it was ended.
     """
-    again = run.directory / ".rrd"
+    again = run.directory / _AGAIN
     if again.is_symlink():
         again.unlink()
     try:
@@ -251,9 +284,3 @@ def _show(
                     file.replace(run.directory / name / file.name)
     finally:
         shutil.rmtree(again, ignore_errors=True)
-
-
-def _mcap(item: Judged) -> Path:
-    assert item.result is not None
-    assert item.result.recordings is not None
-    return item.result.recordings.mcap

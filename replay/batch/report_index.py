@@ -11,7 +11,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 import replay
-from replay.batch.judged import LOG, OVERLAY, Judged, Regression, Verdict
+from replay.batch.case_folder import LOG
+from replay.batch.judged import OVERLAY, Judged, Regression, Verdict
 from replay.comparison import report_html
 from replay.errors import count
 
@@ -93,5 +94,14 @@ def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
     home = quote(os.fsencode(item.name))
     links = [(name, f"{home}/{quote(os.fsencode(name))}") for name in names if (folder / name).is_file()]
     if item.comparison is not None:
-        links.append(("baseline", Path(item.comparison.baseline).resolve().as_uri()))
+        links.append(("baseline", _address(Path(item.comparison.baseline).resolve(), found.run.directory.resolve())))
     return tuple(links)
+
+
+def _address(file: Path, folder: Path) -> str:
+    """Return a file's address as seen from a page in a folder, so that both can be moved together."""
+    try:
+        way = Path(os.path.relpath(file, folder))
+    except ValueError:  # it is on another drive
+        return file.as_uri()
+    return "/".join(quote(os.fsencode(part)) for part in way.parts)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import replay
@@ -10,8 +12,9 @@ from replay.batch.history import Night, append_night, failing_since, read_histor
 from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
-from replay.batch.run import as_json
-from replay.errors import WriteError, count
+from replay.batch.run_file import as_json
+from replay.comparison.run_folder import RUN
+from replay.errors import count
 from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
@@ -25,14 +28,14 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         history: where nights are kept; RUNDIR/history.jsonl when left out.
 
     Raises:
-        WriteError: a file cannot be written; when it is the history, the others have been.
+        WriteError: a file cannot be written; the others have been.
     """
     named, history = history is not None, history or found.run.directory / HISTORY
-    unknown: WriteError | None = None
-    try:
+    problems: list[Exception] = []
+    nights: list[Night] = []
+    with _kept(problems):  # the night itself is not lost for its history
         nights = read_history(history)
-    except WriteError as error:  # the night itself is not lost for it
-        nights, unknown = [], error
+    readable = not problems
     failing = frozenset(item.name for item in found.judged if not item.verdict.fine)
     earlier = {name: failing_since(nights, name) for name in failing}
     since = {name: time for name, time in earlier.items() if time is not None}
@@ -53,13 +56,26 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         },
         "unused_baselines": list(found.unused),
     }
-    write_file(directory / "run.json", json.dumps(summary, indent=1) + "\n")
-    write_file(directory / JUNIT, junit(found))
-    write_file(directory / INDEX, index(found, since))
-    if unknown is not None:
-        raise unknown
-    if not found.run.interrupted:
-        append_night(history, Night(started, replay.__version__, verdicts(found), failing), named=named)
+    with _kept(problems):
+        write_file(directory / JUNIT, junit(found))
+    with _kept(problems):
+        write_file(directory / INDEX, index(found, since))
+    with _kept(problems):  # the last of the three: until it is there, the run counts as interrupted
+        write_file(directory / RUN, json.dumps(summary, indent=1) + "\n")
+    if readable and not found.run.interrupted:
+        with _kept(problems):
+            append_night(history, Night(started, replay.__version__, verdicts(found), failing), named=named)
+    if problems:
+        raise problems[0]
+
+
+@contextlib.contextmanager
+def _kept(problems: list[Exception]) -> Iterator[None]:
+    """Keep what goes wrong in a `with` block, so that what comes after it is done all the same."""
+    try:
+        yield
+    except Exception as error:
+        problems.append(error)
 
 
 def describe(found: Regression) -> list[str]:

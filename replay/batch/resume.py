@@ -36,6 +36,8 @@ def earlier_result(
     for path in (paths.mcap, paths.rrd, folder / RESULT):
         if path is not None and not path.is_file():
             return f"there is no {path.name}"
+        if path is not None and (path.is_symlink() or folder.is_symlink()):
+            return f"{path.name} is a link, or in a folder that is one"
     try:
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)

@@ -7,29 +7,25 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import datetime
 import errno
-import json
 import os
-import platform
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import psutil
-
-import replay
-from replay.batch.case import CaseOrder, CaseResult, Status, describe, run_case
+from replay.batch.case import CaseOrder, CaseResult, Status, run_case
+from replay.batch.case_folder import KINDS, LOG, begin, finish, remove_unfinished, unwritable
+from replay.batch.claim import Claim, claim
 from replay.batch.cost import expected_cost
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import earlier_result
+from replay.batch.run_file import Run, RunFile
 from replay.batch.tls import Certificates
 from replay.batch.watch import Unwatched, Watch
-from replay.batch.written import RESULT
-from replay.errors import NoSpaceError, RecordingExistsError, WriteError, printable
-from replay.logs.part_file import append_lines, refuse_link, write_file
+from replay.errors import NoSpaceError, RecordingExistsError, WriteError
+from replay.logs.part_file import refuse_link, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -55,32 +51,6 @@ class Execution:
     certificates: Certificates | None = None
 
 
-@dataclass(frozen=True)
-class Run:
-    """What became of a run.
-
-    Attributes:
-        directory: the run folder.
-        results: of each scenario, in the order in which they were given.
-        interrupted: it was ended before all scenarios were.
-        started: when.
-        seconds: wall time.
-        workers: number of processes.
-    """
-
-    directory: Path
-    results: tuple[CaseResult, ...]
-    interrupted: bool
-    started: datetime.datetime
-    seconds: float
-    workers: int
-
-    @property
-    def passed(self) -> bool:
-        """Whether every scenario was recorded and kept its expectations."""
-        return all(result.status is Status.PASSED for result in self.results)
-
-
 def run_all(
     scenarios: Sequence[Scenario],
     directory: str | Path,
@@ -90,6 +60,7 @@ def run_all(
     savings: bool = True,
     overwrite: bool = False,
     resume: bool = False,
+    whole: bool = True,
     failed: Sequence[CaseResult] = (),
     execution: Execution | None = None,
     watch: Watch | None = None,
@@ -98,7 +69,8 @@ def run_all(
 
     A scenario that fails, crashes, hangs, eats memory or has a folder that cannot be written does not stop the others;
     its result says so. An interrupt (Ctrl-C) ends all processes and is told by `interrupted`; what was finished stays.
-    Until it is over the run folder says that it was interrupted, so that one that was killed is never taken for whole.
+    The run folder is ours alone meanwhile, and until it is over run.json says that it was interrupted, so that one that
+    was killed is never taken for whole.
 
     Args:
         scenarios: what to run.
@@ -108,11 +80,13 @@ def run_all(
         savings: see `simulation.simulate`.
         overwrite: replace recordings that exist; one whose scenario now fails is removed.
         resume: keep the results of an earlier run that are still valid, and replace the others.
+        whole: nothing is left to be done in the run folder afterwards; otherwise run.json goes on saying "interrupted".
         failed: results of scenarios that failed before they could be run; they come last.
         execution: where, and within which limits.
         watch: follows the run.
 
     Raises:
+        BusyError: another process writes the run folder.
         RecordingExistsError: a recording exists and may not be overwritten; nothing is run then.
         WriteError: the run folder cannot be written; NoSpaceError when the disk becomes full.
         InvalidValue: the address of a Dask scheduler is none; nothing is written then.
@@ -124,63 +98,103 @@ def run_all(
         from replay.batch.cluster import check_address
 
         check_address(execution.dask, execution.certificates)
-    started = datetime.datetime.now(datetime.UTC)
-    results: dict[str, CaseResult] = {}
-    if resume:
-        results = _reused(scenarios, directory, model=model, rrd=rrd, savings=savings, watch=watch)
-    elif not overwrite:
-        for name in (*(scenario.name for scenario in scenarios), *(result.name for result in failed)):
-            for recording in (directory / name / f"{name}{kind}" for kind in (".mcap", ".rrd")):
-                if recording.exists():
-                    raise RecordingExistsError(str(recording), resumable=True)
-    left = [scenario for scenario in scenarios if scenario.name not in results]
-    costs = {scenario.name: expected_cost(scenario) for scenario in left}
-    workers = min(execution.workers or os.cpu_count() or 1, max(len(left), 1))
-    interrupted = True
-
-    def write_summary() -> Run:
-        lost = "the run was ended before this scenario was"
-        ended = [results.get(s.name, CaseResult(s.name, Status.INTERRUPTED, error=lost)) for s in scenarios]
-        ended += failed
-        seconds = (datetime.datetime.now(datetime.UTC) - started).total_seconds()
-        run = Run(directory, tuple(ended), interrupted, started, seconds, workers)
-        write_file(directory / "run.json", json.dumps(as_json(run), indent=1) + "\n")
-        return run
-
-    write_summary()
-    for result in failed:
-        _remove_unfinished(directory / result.name)  # with what an earlier run said
-        _finish(result, directory / result.name)
-    try:
-        watch.plan(costs)
-        tasks = []
-        for scenario in left:
-            log = directory / scenario.name / "log.txt"
-            try:
-                refuse_link(log.parent)
-                write_file(log, "")
-            except WriteError as error:
-                results[scenario.name] = _unwritable(scenario.name, error)
-                watch.done(results[scenario.name])
-                continue
-            order = CaseOrder(scenario, log.parent, model, rrd, savings)
-            tasks.append(Task(scenario.name, order, costs[scenario.name], log))
-        with contextlib.closing(_endings(tasks, workers, execution, watch)) as endings:
-            for ended in endings:
-                result = _finish(_result(ended), ended.task.payload.folder)
-                results[result.name] = result
-                watch.done(result)
-                if result.no_space:
-                    raise NoSpaceError(str(directory), os.strerror(errno.ENOSPC))
-        interrupted = False
-    except KeyboardInterrupt:
-        for scenario in left:
-            if scenario.name not in results:
-                _remove_unfinished(directory / scenario.name)
-    return write_summary()
+    names = [*(scenario.name for scenario in scenarios), *(result.name for result in failed)]
+    how: dict[str, Any] = {"model": model, "rrd": rrd, "savings": savings}
+    with claim(directory) as claimed:
+        known: dict[str, CaseResult] = {}
+        if resume:
+            known = _reused(scenarios, directory, watch=watch, **how)
+        elif not overwrite:
+            _refuse_existing(directory, names)
+        left = [scenario for scenario in scenarios if scenario.name not in known]
+        workers = min(execution.workers or os.cpu_count() or 1, max(len(left), 1))
+        file = RunFile(directory, names, workers=workers)
+        file.begin([*known.values(), *failed])
+        orders = [CaseOrder(scenario, directory / scenario.name, **how) for scenario in left]
+        interrupted = True
+        try:
+            for result in failed:
+                remove_unfinished(directory / result.name)  # with what an earlier run said
+                _settle(finish(result, directory / result.name), file, directory)
+            _run_orders(orders, file, directory, workers, execution, watch, claimed)
+            interrupted = False
+        except (KeyboardInterrupt, NoSpaceError) as error:
+            for order in orders:
+                if order.scenario.name not in file:
+                    remove_unfinished(order.folder)
+            if isinstance(error, NoSpaceError):
+                with contextlib.suppress(WriteError):
+                    file.end(interrupted=True)
+                raise
+        with watch.undisturbed():
+            return file.end(interrupted=interrupted, whole=whole)
 
 
-def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: Watch) -> Generator[Ended]:
+def _run_orders(
+    orders: Sequence[CaseOrder],
+    file: RunFile,
+    directory: Path,
+    workers: int,
+    execution: Execution,
+    watch: Watch,
+    claimed: Claim,
+) -> None:
+    """Run what is left, and take down what becomes of it.
+
+    Raises:
+        KeyboardInterrupt: it was ended.
+        NoSpaceError: the disk is full.
+    """
+    costs = {order.scenario.name: expected_cost(order.scenario) for order in orders}
+    watch.plan(costs)
+    tasks = []
+    for order in orders:
+        name, log = order.scenario.name, order.folder / LOG
+        try:
+            refuse_link(order.folder)
+            write_file(log, "")
+        except WriteError as error:
+            result = unwritable(CaseResult(name), error)
+            _settle(result, file, directory)
+            watch.done(result)
+            continue
+        tasks.append(Task(name, order, costs[name], log))
+    with contextlib.closing(_endings(tasks, workers, execution, watch, claimed)) as endings:
+        for ended in endings:
+            result = _result(ended)
+            if result.status.recorded:  # that is true whatever comes next
+                file.add(result)
+            result = finish(result, ended.task.payload.folder)
+            _settle(result, file, directory)
+            watch.done(result)
+
+
+def _settle(result: CaseResult, file: RunFile, directory: Path) -> None:
+    """Take down what became of a scenario after all; a full disk ends the run."""
+    if result.no_space:
+        file.add(result)
+        raise NoSpaceError(str(directory), os.strerror(errno.ENOSPC))
+    if not result.status.recorded:
+        file.add(result)
+
+
+def _refuse_existing(directory: Path, names: Sequence[str]) -> None:
+    for name in names:
+        for recording in (directory / name / f"{name}{kind}" for kind in KINDS):
+            if recording.exists():
+                raise RecordingExistsError(str(recording), resumable=True)
+
+
+def _endings(
+    tasks: Sequence[Task], workers: int, execution: Execution, watch: Watch, claimed: Claim
+) -> Generator[Ended]:
+    folders = {task.name: task.payload.folder for task in tasks}
+
+    def follow(name: str, done: int, total: int) -> None:
+        if not total:
+            begin(folders[name])
+        watch.follow(name, done, total)
+
     orders = [task.payload for task in tasks]
     needs = {need: None for order in orders for need in needs_of([order.scenario], order.model)}
     limits: dict[str, Any] = {
@@ -191,8 +205,9 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
             rrd=any(order.rrd for order in orders),
             savings=all(order.savings for order in orders),
         ),
-        "follow": watch.follow,
+        "follow": follow,
         "check": watch.check,
+        "undisturbed": watch.undisturbed,
     }
     cores = execution.workers or os.cpu_count() or 1
     if execution.dask is not None:
@@ -201,7 +216,8 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
         cluster = Cluster(execution.dask, run_case, certificates=execution.certificates, tell=watch.tell, **limits)
         yield from cluster.run(tasks)
     else:
-        pool = Pool(run_case, workers=workers, helpers=cores, tell=watch.tell, preparing=watch.prepare, **limits)
+        limits |= {"tell": watch.tell, "preparing": watch.prepare, "inherit": claimed.handles}
+        pool = Pool(run_case, workers=workers, helpers=cores, **limits)
         yield from pool.run(tasks)
 
 
@@ -226,62 +242,3 @@ def _result(ended: Ended) -> CaseResult:
     return CaseResult(
         ended.task.name, _STATUS[ended.ending], error=ended.reason, seconds=ended.seconds, memory=ended.memory
     )
-
-
-def _finish(result: CaseResult, folder: Path) -> CaseResult:
-    """Leave the folder as the result says: no recording of an earlier run beside the failure of this one.
-
-    Returns:
-        The result, or that the folder cannot be written.
-    """
-    try:
-        refuse_link(folder)
-        for kind in () if result.status.recorded else (".mcap", ".rrd"):
-            with contextlib.suppress(OSError):
-                (folder / f"{result.name}{kind}").unlink(missing_ok=True)
-        write_file(folder / RESULT, json.dumps(result.as_json(), indent=1) + "\n")
-        append_lines(folder / "log.txt", map(printable, describe(result)))
-    except WriteError as error:
-        return dataclasses.replace(_unwritable(result.name, error), seconds=result.seconds, memory=result.memory)
-    return result
-
-
-def _unwritable(name: str, error: WriteError) -> CaseResult:
-    """Return the result of a scenario whose folder cannot be written; a full disk ends the run."""
-    if isinstance(error, NoSpaceError):
-        raise error
-    return CaseResult(name, Status.FAILED, error=str(error))
-
-
-def _remove_unfinished(folder: Path) -> None:
-    """Remove what a scenario that was ended has written; what an earlier run left stays."""
-    for file in (*folder.glob("*.part"), folder / "log.txt") if not folder.is_symlink() else ():
-        with contextlib.suppress(OSError):
-            file.unlink(missing_ok=True)
-
-
-def as_json(run: Run) -> dict[str, object]:
-    """Return what run.json holds: what belongs to this machine and this moment, which recordings do not know."""
-    return {
-        "replay": replay.__version__,
-        "host": platform.node(),
-        "platform": platform.platform(),
-        "python": platform.python_version(),
-        "cores": os.cpu_count(),
-        "memory": psutil.virtual_memory().total,
-        "workers": run.workers,
-        "started": run.started.isoformat(timespec="seconds"),
-        "seconds": round(run.seconds, 3),
-        "interrupted": run.interrupted,
-        "planned": len(run.results),
-        "scenarios": {
-            result.name: {
-                "status": result.status.value,
-                "seconds": round(result.seconds, 3),
-                "memory": result.memory,
-                **({"error": result.error} if result.error else {}),
-                **({"reused": True} if result.reused else {}),
-            }
-            for result in run.results
-        },
-    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 from replay.batch.case import CaseResult
@@ -32,6 +33,10 @@ class Watch(Protocol):
     def check(self) -> None:
         """Do nothing, but be called all the time, so that a request to end the run is noticed soon."""
 
+    def undisturbed(self) -> AbstractContextManager[None]:
+        """Return a context in which a request to end the run waits for `check`."""
+        ...
+
 
 class Unwatched:
     """Nobody follows."""
@@ -56,3 +61,7 @@ class Unwatched:
 
     def check(self) -> None:
         """Do nothing."""
+
+    def undisturbed(self) -> AbstractContextManager[None]:
+        """Return a context that does nothing."""
+        return nullcontext()

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from replay.batch.memory import Peak, PeakMeter
+
 Follow = Callable[[int, int], None]
 """Called with what is done of a task and all of it."""
 Work = Callable[[Any, Follow], Any]
@@ -80,16 +82,18 @@ class Advanced:
 
 @dataclass(frozen=True)
 class Finished:
-    """What the task returned."""
+    """What the task returned, and the most memory that it took."""
 
     value: Any
+    peak: Peak
 
 
 @dataclass(frozen=True)
 class Raised:
-    """The task ended in an exception: its one line; the log has all of it."""
+    """The task ended in an exception: its one line; the log has all of it. And the most memory that it took."""
 
     text: str
+    peak: Peak
 
 
 class Messages:
@@ -135,11 +139,13 @@ def main() -> None:
     while True:
         order: Order = inbox.get()
         with _printing_to(order.log):
+            meter = PeakMeter()
             try:
-                message: object = Finished(start.work(order.payload, _throttled(answer)))
+                value = start.work(order.payload, _throttled(answer))
+                message: object = Finished(value, meter.read())
             except Exception as error:
                 traceback.print_exc()
-                message = Raised(f"{type(error).__name__}: {error}")
+                message = Raised(f"{type(error).__name__}: {error}", meter.read())
         answer(message)
 
 

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from replay import limits
-from replay.json_text import read_json, typed
+from replay.json_text import read_json, read_json_file, typed
 
-RUN, RESULT = "run.json", "result.json"
-"""Names of what a run folder, and a scenario's folder in it, hold."""
+RESULT = "result.json"
+"""Name of the file that says what became of a scenario, in its folder."""
 
 _Count = Annotated[int, Field(ge=0, lt=1 << 53)]
-
-
-class RunScenario(TypedDict):
-    """What run.json says of one scenario, as far as it is read."""
-
-    status: str
-
-
-class WrittenRun(TypedDict):
-    """run.json, as far as it is read."""
-
-    scenarios: dict[str, RunScenario]
-    interrupted: bool
 
 
 class WrittenOutcome(TypedDict):
@@ -59,24 +45,11 @@ class WrittenNight(TypedDict):
     failing: list[str]
 
 
-def read_run(directory: Path) -> WrittenRun:
-    """Return what a run folder's run.json says; OSError or ValueError when there is none that replay wrote."""
-    return typed(_document(directory / RUN), WrittenRun)
-
-
 def read_result(path: Path) -> WrittenResult:
     """Return what a result.json says; OSError or ValueError when it is none that replay wrote."""
-    return typed(_document(path), WrittenResult)
+    return typed(read_json_file(path), WrittenResult)
 
 
 def read_night(line: str) -> WrittenNight:
     """Return what a line of a history says; ValueError when it is none that replay wrote."""
-    return typed(read_json(line), WrittenNight)
-
-
-def _document(path: Path) -> Any:
-    if not path.is_file():
-        raise FileNotFoundError(str(path))
-    if path.stat().st_size > limits.RECORD_JSON:
-        raise ValueError(f"it has more than {limits.RECORD_JSON} bytes")
-    return read_json(path.read_bytes())
+    return typed(read_json(line, surrogates=True), WrittenNight)

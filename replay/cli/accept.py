@@ -25,6 +25,13 @@ def accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
 
     A run that was interrupted or has a scenario that failed is refused.
     """
+    from replay.batch.claim import claim
+
+    with claim(rundir, shared=True), claim(baseline):  # what is shown is what is stored
+        return _accept(rundir, baseline, reason, yes)
+
+
+def _accept(rundir: Path, baseline: Path, reason: str, yes: bool) -> ExitCode:
     from replay.batch.accept import plan_acceptance
 
     plan = plan_acceptance(rundir, baseline)

@@ -6,14 +6,22 @@ are loaded, Python drops the exception or the library turns it into another; so 
 
 from __future__ import annotations
 
+import contextlib
+import math
 import signal
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+_SECONDS_OF_ONE_REQUEST = 0.5
+"""Who stops a process and its group, as `timeout` does, sends the same request twice."""
+
 _requested = threading.Event()
 _settled = threading.Event()
+_held: list[None] = []
+_last = -math.inf
 
 
 def install() -> None:
@@ -25,6 +33,16 @@ def check() -> None:
     """Raise KeyboardInterrupt when the command was asked to stop and still runs."""
     if _requested.is_set():
         raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let a request to stop wait for the next `check` within a `with` block; another one ends the command at once."""
+    _held.append(None)
+    try:
+        yield
+    finally:
+        _held.pop()
 
 
 def settle() -> None:
@@ -50,8 +68,15 @@ def _handle(handler: Callable[[int, FrameType | None], None] | signal.Handlers) 
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    global _last
+    now = time.monotonic()
+    repeated, _last = now - _last < _SECONDS_OF_ONE_REQUEST, now
+    if repeated:
+        return
     if _settled.is_set():
         _settled.clear()
         return
+    again = _requested.is_set()
     _requested.set()
-    raise KeyboardInterrupt
+    if again or not _held:
+        raise KeyboardInterrupt

@@ -114,9 +114,6 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
     except (KeyboardInterrupt, click.Abort):
         terminal.put(["replay: interrupted"], err=True)
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()  # nobody reads on; Python would complain about it at exit
-        return ExitCode.FINE
     except OSError as error:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
             return _fault(error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -102,6 +103,10 @@ class RunProgress:
     def check(self) -> None:
         """Raise KeyboardInterrupt when the command was asked to stop."""
         interruption.check()
+
+    def undisturbed(self) -> AbstractContextManager[None]:
+        """Return a context in which a request to stop waits for `check`."""
+        return interruption.undisturbed()
 
     def tell(self, text: str) -> None:
         """Say something above the bars."""

@@ -24,6 +24,7 @@ RRD: Any = {"type": click.Choice(["failing", "all", "none"]), "default": "failin
 @click.option("--missing-baseline", "missing", **MISSING, help="What a scenario without one is.")
 @click.option("--rrd", **RRD, help="Scenarios to record for eyes.")
 @click.option("--history", type=PathName(), help="File that each night appends to; OUTPUT/history.jsonl when left out.")
+@click.option("--resume", is_flag=True, help="Carry on a night that was cut: keep results that are up to date.")
 @options.model_option
 @options.select_option
 @options.shard_option
@@ -42,6 +43,7 @@ def regress(
 
     Exit codes: 1 different; 2 invalid or unreadable; 4 failed or without a baseline; 130 interrupted (partial reports).
     """
+    from replay.batch.claim import claim
     from replay.batch.regress import regress as judge
     from replay.batch.select import Selection, rules_beside
     from replay.cli.progress import RunProgress
@@ -56,6 +58,8 @@ def regress(
     rules = rules or rules_beside(scenarios)
     settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or "", "history": history}
-    with RunProgress() as watch:
-        found = judge(selection, output, baseline, missing=how["missing"], rrd=how["rrd"], watch=watch, **settings)
-    return report(found, history=history)
+    settings |= {name: how[name] for name in ("missing", "rrd", "resume")}
+    with claim(output):
+        with RunProgress() as watch:
+            found = judge(selection, output, baseline, watch=watch, **settings)
+        return report(found, history=history)

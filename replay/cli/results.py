@@ -13,7 +13,7 @@ from replay.cli.terminal import put
 if TYPE_CHECKING:
     from replay.batch.case import CaseResult
     from replay.batch.judged import Regression
-    from replay.batch.run import Run
+    from replay.batch.run_file import Run
 
 
 def show(form: str, run: Run) -> None:
@@ -61,8 +61,12 @@ def report(found: Regression, *, history: Path | None) -> ExitCode:
     from replay.batch.reports import describe, write_reports
 
     interruption.settle()
-    write_reports(found, history=history)
-    put([*describe(found), f"report: {found.run.directory / INDEX}"])
+    lines = describe(found)
+    try:
+        write_reports(found, history=history)
+        lines.append(f"report: {found.run.directory / INDEX}")
+    finally:
+        put(lines)
     interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
     invalid = ExitCode.INVALID if any(result.invalid for result in found.run.results) else ExitCode.FINE
     return worst([interrupted, invalid, *(exit_code_of(item.verdict.name) for item in found.judged)])

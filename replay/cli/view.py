@@ -35,7 +35,7 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
     with one_recording(rerun_files(recordings)) as file:
         if web:
             names = ", ".join(path.name for path in recordings)
-            serve(file, lambda address: click.echo(f"{address} shows {names} until Ctrl-C"))
+            serve(file, lambda address: put([f"{address} shows {names} until Ctrl-C"]))
         elif screenshot is None:
             show(file)
         else:

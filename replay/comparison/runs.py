@@ -12,11 +12,13 @@ from replay.comparison.diff import compare
 from replay.comparison.difference import JSON_VERSION, Change, Difference, Verdict
 from replay.comparison.log_changes import SCENE, equal_topics, scene_changes, schema_changes
 from replay.comparison.rules import Rules
+from replay.comparison.run_folder import recordings_in
 from replay.comparison.signals import places
-from replay.errors import InvalidValue, RecordingError
+from replay.errors import InvalidValue, RecordingError, ReplayError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.reader import Recording, own_topics, read, read_provenance
 
+_ATTEMPTS = 3
 SCENARIOS = "/scenarios"
 """Begins the name of a scenario in rules: `/scenarios/carm_clear` with `ignore` lets it be missing or extra."""
 
@@ -154,7 +156,35 @@ def read_pair(baseline: str | Path, candidate: str | Path, *, rules: Rules | Non
     """Read two recordings, without the topics that are the same bytes in both and stand for the same signals.
 
     Under a rule that lets no NaN pass, not even in both, all topics are read.
+
+    Raises:
+        RecordingError: one cannot be read, or is replaced again and again while it is read.
     """
+    files = Path(baseline), Path(candidate)
+    for _ in range(_ATTEMPTS):
+        before = [_identity(file) for file in files]
+        try:
+            pair, wrong = _read_pair(baseline, candidate, rules), None
+        except ReplayError as error:
+            wrong = error
+        changed = [str(file) for file, one in zip(files, before, strict=True) if _identity(file) != one]
+        if not changed and wrong is not None:
+            raise wrong
+        if not changed:
+            return pair
+    raise RecordingError(changed[0], "is replaced by another process while it is read")
+
+
+def _identity(file: Path) -> tuple[int, ...]:
+    """Return what tells a file from one that takes its place; nothing of one that is not there."""
+    try:
+        found = file.stat()
+    except OSError:
+        return ()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None) -> Pair:
     with McapLog(baseline) as log_a, McapLog(candidate) as log_b:
         layout_a, layout_b = read_provenance(log_a).layout, read_provenance(log_b).layout
         bytes_equal = equal_topics(log_a, log_b)
@@ -205,7 +235,8 @@ def diff_runs(
     A recording in a folder that cannot be read is told in the result and does not keep the others from being compared.
 
     Args:
-        baseline, candidate: two MCAP files or two folders with MCAP files in them.
+        baseline, candidate: two MCAP files, or two folders: of run folders what their run.json lists is compared, of
+            others all MCAP files in them.
         rules: tolerances; without them everything must be equal.
         strict_provenance: other versions, models and inputs make the verdict "different".
         visit: called for each scenario while its columns are in memory, for reports that draw them.
@@ -221,7 +252,7 @@ def diff_runs(
             "candidate", candidate, f"must be a {'folder' if folders[0] else 'file'}, as the baseline is"
         )
     if folders[0]:
-        a, b = _recordings(Path(baseline)), _recordings(Path(candidate))
+        a, b = recordings_in(Path(baseline)), recordings_in(Path(candidate))
     else:
         a, b = {"": Path(baseline)}, {"": Path(candidate)}
     cases, unreadable = [], []
@@ -248,15 +279,3 @@ def diff_runs(
         ignored=tuple(name for name in (*missing, *extra) if rules.tolerance(f"{SCENARIOS}/{name}").ignore),
         unreadable=tuple(unreadable),
     )
-
-
-def _recordings(folder: Path) -> dict[str, Path]:
-    """Return the recordings of a run folder by scenario: RUNDIR/<scenario>/<name>.mcap."""
-    found = {}
-    for path in sorted(folder.rglob("*.mcap")):
-        inside = path.relative_to(folder).with_suffix("")
-        name = inside.parent if inside.parent.name == inside.name else inside
-        found[name.as_posix()] = path
-    if not found:
-        raise RecordingError(str(folder), "holds no recording (*.mcap)")
-    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import json
 import os
 from collections.abc import Iterable
@@ -11,15 +12,20 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError
+from replay.logs.file_lock import is_at, lock
 
 _NO_SPACE = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT") if hasattr(errno, name)}  # the second: a quota's
 
 UNFINISHED = ".part"
 """What the name of a file ends in while it is written."""
+_numbers = itertools.count(1)
 
 
 class PartFile:
     """A binary file written as NAME.part, made durable and renamed to NAME when it is complete.
+
+    The file is locked while it is written: where another process, or thread, writes NAME too, each has a file of its
+    own, and the last to be complete is the one that stays.
 
     Attributes:
         path: the final name.
@@ -34,14 +40,13 @@ class PartFile:
             WriteError: the file cannot be created.
         """
         self.path = path
-        self.part = path.with_name(path.name + UNFINISHED)
+        self._overwrite = overwrite
+        self._finished = False
         if path.exists() and not overwrite:
             raise RecordingExistsError(str(path))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            if not self.part.is_char_device():  # a link to a file, or a pipe, is not what a killed run left
-                self.part.unlink(missing_ok=True)
-            self._stream: BinaryIO = self.part.open("wb")
+            self.part, self._stream, self._ours = _open_part(path)
         except (OSError, UnicodeEncodeError) as error:
             raise write_error(path, error) from None
 
@@ -60,34 +65,95 @@ class PartFile:
             raise write_error(self.path, error) from None
 
     def finish(self) -> None:
-        """Make the file durable, under the name that it has while it is written; nothing can be appended any more.
+        """Make the file durable, under the name that it has while it is written; nothing may be appended any more.
 
         Raises:
             WriteError: it cannot be written; NoSpaceError when the disk is full.
         """
         try:
-            if not self._stream.closed:
+            if not self._finished:
                 self._stream.flush()
                 os.fsync(self._stream.fileno())
-                self._stream.close()
+                self._finished = True
         except OSError as error:
             raise write_error(self.path, error) from None
 
     def commit(self) -> None:
-        """Make the file durable and give it its name."""
+        """Make the file durable and give it its name.
+
+        Raises:
+            RecordingExistsError: meanwhile another process has written one, and `overwrite` is false.
+            WriteError: as of `finish`, or what stands under the unfinished name is not this file any more.
+        """
         self.finish()
+        if not self._overwrite and self.path.exists():
+            raise RecordingExistsError(str(self.path))
         try:
+            if self._ours and not is_at(self._stream.fileno(), self.part):
+                raise WriteError(str(self.path), f"{self.part.name} was removed or replaced while it was written")
+            if os.name == "nt":  # which renames no open file
+                self._stream.close()
             self.part.replace(self.path)
+            self._stream.close()
             _sync_folder(self.path.parent)
         except OSError as error:
             raise write_error(self.path, error) from None
 
     def discard(self) -> None:
         """Close and remove the unfinished file; never raises, because it runs while another error is on its way."""
+        with contextlib.suppress(OSError, ValueError):  # the second: it is closed
+            if os.name != "nt" and (not self._ours or is_at(self._stream.fileno(), self.part)):
+                self.part.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # the buffered rest may not fit on a full disk; the file goes away anyway
             self._stream.close()
-        with contextlib.suppress(OSError):
-            self.part.unlink(missing_ok=True)
+        if os.name == "nt":  # which removes no open file
+            with contextlib.suppress(OSError):
+                self.part.unlink(missing_ok=True)
+
+
+def _open_part(path: Path) -> tuple[Path, BinaryIO, bool]:
+    """Create and lock the file that becomes `path`; return its name, itself, and whether it is one of ours.
+
+    It is NAME.part; or NAME with a number of ours where a living process writes that one.
+    """
+    part = path.with_name(path.name + UNFINISHED)
+    if part.is_char_device():
+        return part, part.open("wb"), False
+    while True:
+        try:
+            stream = part.open("xb")
+        except FileExistsError:
+            if not _remove_left_over(part):
+                part = path.with_name(f"{path.stem}.{os.getpid()}-{next(_numbers)}{path.suffix}{UNFINISHED}")
+            continue
+        if lock(stream.fileno()) and is_at(stream.fileno(), part):
+            return part, stream, True
+        stream.close()  # another process took it for left over before it was locked
+
+
+def _remove_left_over(part: Path) -> bool:
+    """Remove an unfinished file that nobody writes; return false when somebody does."""
+    if os.name == "nt":
+        try:
+            part.unlink(missing_ok=True)
+        except PermissionError:
+            return False
+        return True
+    try:
+        handle = os.open(part, os.O_RDWR | os.O_NOFOLLOW)
+    except FileNotFoundError:  # it has just got its name
+        return True
+    except OSError:  # a link, which is not what a killed run left, or another user's
+        part.unlink(missing_ok=True)
+        return True
+    try:
+        if not lock(handle):
+            return False
+        if is_at(handle, part):
+            part.unlink()
+        return True
+    finally:
+        os.close(handle)
 
 
 def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: bool = False) -> Path:
@@ -134,7 +200,8 @@ def append_lines(path: Path, lines: Iterable[str], *, named: bool = False) -> No
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("ab", buffering=0) as stream:
-            before = stream.tell()
+            lock(stream.fileno(), wait=True)  # several machines may append to one history
+            before = stream.seek(0, os.SEEK_END)
             try:
                 while data:
                     data = data[stream.write(data) :]

@@ -37,6 +37,10 @@ def behave(payload, follow):
             eaten = b"x" * (400 << 20)
             time.sleep(3600)
             del eaten
+        case "eat for a moment":
+            eaten = b"x" * (400 << 20)
+            del eaten
+            return "done"
         case "pid":
             return os.getpid()
     raise AssertionError(what)
@@ -60,3 +64,12 @@ def slow_start(messages):
     """Prepare for longer than the tests' time limits."""
     messages.tell("preparing")
     time.sleep(1.0)
+
+
+def eat_and_forget_nothing(messages):
+    """Take much memory for a moment, on a system that cannot begin to measure anew."""
+    from replay.batch import memory
+
+    memory._REFERENCES = Path("/proc/none/clear_refs")
+    eaten = b"x" * (400 << 20)
+    del eaten

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+from pathlib import Path
 
 import pytest
 
@@ -68,9 +69,9 @@ def test_what_and_why_is_logged_and_unneeded_meshes_go(run, tmp_path):
     baseline = Baseline(tmp_path)
     baseline.store(entries(run, "a"), reason="first", now=NOW)
     (tmp_path / "objects" / ("0" * 64)).write_bytes(b"left over")
-    baseline.store(entries(run, "a"), reason="näher", now=NOW)
+    baseline.store(entries(run, "a"), reason="näher \udcff", now=NOW)
     log = [json.loads(line) for line in (tmp_path / "accepted.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert [line["reason"] for line in log] == ["first", "näher"]
+    assert [line["reason"] for line in log] == ["first", "näher \udcff"]
     assert log[1]["scenarios"] == {"a": "new"}
     assert len(list((tmp_path / "objects").iterdir())) == 1
     assert not list(tmp_path.glob(".staging*"))
@@ -110,6 +111,48 @@ def test_a_mesh_that_is_missing_or_changed_is_an_error(run, tmp_path):
         attached_files(baseline.recording("a"))
 
 
+@pytest.mark.parametrize("after", [0, 1, 2])
+def test_an_acceptance_that_was_killed_is_completed_by_the_next(run, tmp_path, monkeypatch, after):
+    """Each baseline is wholly old or new at any moment, no mesh is missing, and the log says all that was put."""
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    replace, count = Path.replace, iter(range(9))
+
+    def killing(file, target):
+        if file.parent.name == ".staging" and file.suffix == ".mcap" and next(count) == after:
+            raise KeyboardInterrupt
+        return replace(file, target)
+
+    monkeypatch.setattr(Path, "replace", killing)
+    if after < 2:
+        with pytest.raises(KeyboardInterrupt):
+            baseline.store(entries(run, "a", "b"), reason="second", now=NOW)
+    else:
+        baseline.store(entries(run, "a", "b"), reason="second", now=NOW)
+    monkeypatch.setattr(Path, "replace", replace)
+    assert (after == 0) <= (baseline.names() == ["a"])
+    for name in baseline.names():
+        attached_files(baseline.recording(name))
+    baseline.store(entries(run, "a"), reason="third", now=NOW)
+    assert baseline.names() == ["a", "b"]
+    attached_files(baseline.recording("b"))
+    log = [json.loads(line) for line in (tmp_path / "accepted.jsonl").read_text().splitlines()]
+    assert [(line["reason"], list(line["scenarios"])) for line in log] == [
+        ("first", ["a"]),
+        ("second", ["a", "b"]),
+        ("third", ["a"]),
+    ]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a", "accepted.jsonl", "b", "objects"]
+
+
+def test_what_a_killed_acceptance_had_not_all_written_is_dropped(run, tmp_path):
+    (tmp_path / ".staging").mkdir()
+    (tmp_path / ".staging" / "b.mcap").write_bytes(b"half")
+    Baseline(tmp_path).store(entries(run, "a"), reason="first", now=NOW)
+    assert Baseline(tmp_path).names() == ["a"]
+    assert not (tmp_path / ".staging").exists()
+
+
 def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
     path = tmp_path / "history.jsonl"
     for day, verdicts in enumerate(
@@ -117,10 +160,12 @@ def test_a_row_of_failing_nights_is_counted_from_its_first(tmp_path):
     ):
         failing = frozenset(name for name, verdict in verdicts.items() if verdict != "same")
         append_night(path, Night(f"day {day}", "1", verdicts, failing))
+    append_night(path, Night("day 5", "1", {"\udcff": "failed"}, frozenset(["\udcff"])))
     with path.open("a") as file:
         file.write('{"time": "cut')
     nights = read_history(path)
-    assert len(nights) == 5
+    assert len(nights) == 6
+    assert failing_since(nights, "\udcff") == "day 5"
     assert failing_since(nights, "a") == "day 2"
     assert failing_since(nights, "b") is None
     assert failing_since([], "a") is None

@@ -51,7 +51,7 @@ def accept(folder):
     return run(["accept", str(folder / "run"), "--baseline", str(folder / "base"), "--reason", "x", "--yes"])
 
 
-@pytest.mark.parametrize("place", ["objects", "a", "accepted.jsonl"])
+@pytest.mark.parametrize("place", ["objects", "a", "accepted.jsonl", ".staging", ".lock"])
 @pytest.mark.parametrize("target", ["victim", "victim/thesis.txt", "nothing"])
 def test_a_baseline_with_a_link_in_it_is_refused(ran, capsys, place, target):
     (ran / "base").mkdir()
@@ -143,6 +143,49 @@ def test_a_recording_and_a_log_with_other_names_keep_what_those_hold(ran):
     assert accept(ran) is ExitCode.FINE
     assert listing(ran / "victim") == before
     assert not (ran / "base" / "a" / "a.mcap").is_symlink()
+
+
+@pytest.mark.parametrize("what", ["log", "link", "other scenario", "strange name", "folder that is a link"])
+def test_a_staged_acceptance_of_others_is_looked_at_before_it_is_completed(ran, capsys, what):
+    """It may not be what a killed process of ours has left."""
+    staging = ran / "base" / ".staging"
+    staging.mkdir(parents=True)
+    name = "b\x1b[2J" if what == "strange name" else "b"
+    made_up.write(named("c" if what == "other scenario" else name), ran / "other.mcap")
+    (staging / f"{name}.mcap").write_bytes((ran / "other.mcap").read_bytes())
+    (staging / LOG).write_text('{"reason": "theirs\\u001b[2J"}\n')
+    match what:
+        case "log":
+            (staging / LOG).unlink()
+            (staging / LOG).symlink_to(ran / "victim" / "thesis.txt")
+        case "link":
+            (staging / "b.mcap").unlink()
+            (staging / "b.mcap").symlink_to(ran / "other.mcap")
+        case "folder that is a link":
+            (ran / "base" / "b").symlink_to(ran / "victim")
+    before = listing(ran / "victim")
+    code = accept(ran)
+    assert listing(ran / "victim") == before
+    if what == "log":  # that is not all of one, and goes
+        assert code is ExitCode.FINE
+        assert not staging.exists()
+        assert Baseline(ran / "base").names() == ["a"]
+    else:
+        assert code is ExitCode.INVALID
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.isprintable()
+        assert {path.name for path in (ran / "base").iterdir()} <= {".staging", "b"}
+
+
+def test_the_line_of_a_staged_acceptance_is_one_line(ran):
+    staging = ran / "base" / ".staging"
+    staging.mkdir(parents=True)
+    (staging / LOG).write_text('{"reason":\n "theirs\\u001b[2J"}\n')
+    (ran / "base" / LOG).write_bytes(b"\xff\n")
+    assert accept(ran) is ExitCode.FINE
+    cut, theirs, ours = (ran / "base" / LOG).read_bytes().splitlines()
+    assert (cut, theirs) == (b"\xff", b'{"reason": "theirs\\u001b[2J"}')
+    assert json.loads(ours)["reason"] == "x"
 
 
 NAMES = [

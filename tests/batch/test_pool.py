@@ -10,7 +10,7 @@ import pytest
 
 from replay.batch.pool import Ending, Pool, Task
 from replay.errors import InvalidValue
-from tests.batch.tasks import PrepareTogether, behave, slow_start
+from tests.batch.tasks import PrepareTogether, behave, eat_and_forget_nothing, slow_start
 
 
 def run(tasks, **options):
@@ -119,6 +119,46 @@ def test_workers_do_not_outlive_a_pool_that_is_killed():
     _, alive = psutil.wait_procs(family, timeout=10.0)
     assert family
     assert not alive
+
+
+def test_memory_is_limited_also_where_a_task_is_over_before_anyone_looks():
+    tasks = [Task("quick", ("eat for a moment", None), cost=3.0), Task("small", ("return", 1), cost=2.0)]
+    tasks.append(Task("again", ("eat for a moment", None)))
+    ended = run(tasks, workers=1, memory=300 << 20)
+    assert {name: e.ending for name, e in ended.items()} == {
+        "quick": Ending.MEMORY,
+        "small": Ending.DONE,
+        "again": Ending.MEMORY,
+    }
+    assert "above the limit 300 MiB" in ended["again"].reason
+    assert ended["quick"].memory > 300 << 20
+    assert 0 < ended["small"].memory < 300 << 20
+
+
+def test_memory_that_could_not_be_watched_is_told():
+    said = []
+    tasks = [Task("small", ("return", 1), cost=2.0), Task("more", ("eat for a moment", None))]
+    options = {"prepare": eat_and_forget_nothing, "tell": said.append, "workers": 1}
+    ended = run(tasks, memory=300 << 20, **options)
+    assert ended["small"].ending is Ending.DONE
+    assert said[0] == "small: it was over before its memory could be watched"
+    assert [e.ending for e in run(tasks, memory=900 << 20, **options).values()] == [Ending.DONE] * 2
+    assert len(said) <= 2  # with that limit there is nothing to say
+
+
+def test_an_answer_that_nobody_can_read_is_a_crash_and_not_a_hang():
+    assert run([Task("odd", ("return", Unreadable()))], workers=1)["odd"].ending is Ending.CRASHED
+
+
+class Unreadable:
+    def __reduce__(self):
+        return _fail_here, ()
+
+
+def _fail_here():
+    if "pytest" in sys.modules:
+        raise AttributeError("no such thing")
+    return Unreadable()
 
 
 def test_limits_must_be_positive():

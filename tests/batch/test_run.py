@@ -238,3 +238,121 @@ def test_ctrl_c_ends_cleanly_with_a_partial_report_and_no_process_left(tmp_path)
         "good": "passed",
         "hang": "interrupted",
     }
+
+
+FULL = """
+mkdir full && mount -t tmpfs -o size={size}k none full
+{python} -m replay {command} 2>error.txt
+echo $? > code.txt
+cp -r full/. left/
+"""
+
+
+def on_a_small_disk(folder, command, size):
+    """Run a command where `full` is a disk of some KiB; return its exit code, what it said, and its files."""
+    script = FULL.format(size=size, command=command, python=sys.executable)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    (folder / "left").mkdir()
+    subprocess.run(["unshare", "-m", "bash", "-c", script], cwd=folder, check=True, env=environment)
+    return int((folder / "code.txt").read_text()), (folder / "error.txt").read_text(), folder / "left"
+
+
+mounts = pytest.mark.skipif(
+    sys.platform != "linux" or subprocess.run(["unshare", "-m", "true"], check=False, capture_output=True).returncode,
+    reason="needs to mount a small disk",
+)
+
+
+@mounts
+@pytest.mark.parametrize("size", [60, 76, 92])
+def test_run_json_says_what_was_finished_before_the_disk_was_full(tmp_path, size):
+    for k in range(6):
+        scenes.write(tmp_path / "in", f"s{k}", duration=3)
+    code, error, left = on_a_small_disk(tmp_path, "run in -o full/out --no-rrd --workers 1", size)
+    assert code == 2
+    assert error.splitlines()[-1].endswith("No space left on device")
+    summary = json.loads((left / "out" / "run.json").read_text())
+    assert summary["interrupted"] is True
+    statuses = {name: entry["status"] for name, entry in summary["scenarios"].items()}
+    whole = sorted(file.stem for file in left.glob("out/*/*.mcap"))
+    assert sorted(name for name, status in statuses.items() if status == "passed") == whole
+    assert 0 < len(whole) < 6
+    assert "interrupted" in statuses.values()
+    assert all(summary["scenarios"][name].get("error") for name in statuses if name not in whole)
+    assert not list(left.rglob("*.part")) and not list(left.rglob(".lock"))
+
+
+@mounts
+def test_the_last_words_find_room_on_a_disk_that_others_have_filled(tmp_path):
+    script = """if True:
+        import os
+        from pathlib import Path
+        from replay.batch.case import CaseResult, Status
+        from replay.batch.run_file import RunFile
+        file = RunFile(Path("full"), ["a", "b"], workers=1)
+        file.begin([])
+        file.add(CaseResult("a", seconds=1.25, memory=123456789))
+        filler = os.open("full/filler", os.O_WRONLY | os.O_CREAT)
+        try:
+            while True: os.write(filler, bytes(4096))
+        except OSError: pass
+        run = file.end(interrupted=True)
+        print(run.results)
+    """
+    (tmp_path / "script.py").write_text(script)
+    code, error, left = on_a_small_disk(tmp_path, f"--version; {sys.executable} script.py", 64)
+    assert (code, error) == (0, "")
+    scenarios = json.loads((left / "run.json").read_text())["scenarios"]
+    assert {name: entry["status"] for name, entry in scenarios.items()} == {"a": "passed", "b": "interrupted"}
+    assert scenarios["b"]["error"] == "the run was ended before this scenario was"
+
+
+STOPPED = """
+import os, signal, sys, threading
+import replay.batch.{module} as module
+from replay.cli.main import main
+
+def stopping(*arguments, **options):
+    for number in (signal.SIGTERM, signal.SIGTERM):  # as `timeout` sends it: to the process and to its group
+        os.kill(os.getpid(), number)
+    return original(*arguments, **options)
+
+original = module.{name}
+module.{name} = stopping
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [("run", "finish"), ("case_folder", "append_lines"), ("run_file", "as_json"), ("run", "begin"), ("pool", "_known")],
+)
+def test_a_request_to_stop_at_any_moment_makes_no_finished_scenario_an_interrupted_one(tmp_path, module, name):
+    for k in range(2):
+        scenes.write(tmp_path / "in", f"s{k}")
+    out = tmp_path / "out"
+    code = STOPPED.format(module=module, name=name)
+    arguments = ["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd", "--workers", "1"]
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+    if not (out / "run.json").exists():
+        assert not list(out.rglob("*"))  # it was stopped before it began
+        return
+    summary = json.loads((out / "run.json").read_text())
+    for scenario, entry in summary["scenarios"].items():
+        told = (out / scenario / "result.json").exists()
+        assert entry["status"] == ("passed" if told else "interrupted")
+        assert (out / scenario / f"{scenario}.mcap").exists() >= told
+    assert summary["interrupted"] == any(entry["status"] == "interrupted" for entry in summary["scenarios"].values())
+    assert not list(out.rglob("*.part")) and not list(out.rglob(".lock"))
+
+
+def test_a_killed_run_leaves_no_result_of_an_earlier_one_beside_its_recordings(ran, tmp_path, monkeypatch):
+    """Resuming would take the earlier result for that of the recording; the expectations may be others."""
+    run_all([scenes.scene("crash_a"), scenes.scene("good")], tmp_path, rrd=False, execution=TWO)
+    assert (tmp_path / "crash_a" / "result.json").exists()
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.look_and_misbehave)
+    (found,) = run_all([scenes.scene("good")], tmp_path, rrd=False, overwrite=True, execution=TWO).results
+    assert found.notes == ("good.mcap", "log.txt")

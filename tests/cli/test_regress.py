@@ -6,15 +6,18 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote, urljoin, urlsplit
 from xml.etree import ElementTree
 
 import psutil
 import pytest
 import xmlschema
 
+from replay.batch import regress
 from replay.batch.baseline import Baseline
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
+from replay.errors import RecordingError
 from tests.batch import scenes
 
 XSD = Path(__file__).parents[1] / "data" / "junit.xsd"
@@ -362,3 +365,137 @@ def test_a_night_that_could_not_be_reported_is_not_begun(tmp_path, capsys):
         said = capsys.readouterr().err
         assert message in said and said.count("\n") == 1
         assert not (tmp_path / "out").exists()
+
+
+def test_one_odd_baseline_never_ends_a_night(tmp_path, monkeypatch, capsys):
+    """Whatever is odd about one comparison, in a way that nobody has foreseen."""
+    prepare(tmp_path, plain=4, bad=0, differing=1)
+    read_pair = regress.read_pair
+
+    def odd(baseline, candidate, **rules):
+        match candidate.stem:
+            case "plain_0":
+                raise RecursionError("maximum recursion depth exceeded\nwhile comparing")
+            case "plain_1":
+                raise RecordingError(str(candidate), "damaged: its end is missing")
+            case "plain_2":
+                raise RecordingError(str(baseline), "damaged: its end is missing")
+        return read_pair(baseline, candidate, **rules)
+
+    def undrawable(*_):
+        raise ZeroDivisionError("no extent")
+
+    monkeypatch.setattr(regress, "read_pair", odd)
+    monkeypatch.setattr(regress, "plots", undrawable)
+    monkeypatch.setattr(regress, "write_overlay", undrawable)
+    out = tmp_path / "out"
+    assert night(tmp_path, out) is ExitCode.INVALID
+    assert verdicts_of(out) == {
+        "differ_0": "different",
+        "plain_0": "failed",
+        "plain_1": "failed",
+        "plain_2": "unreadable baseline",
+        "plain_3": "same",
+    }
+    tags = ["failure", "error", "error", "error", "pass"]
+    assert list(junit_of(out).values()) == tags
+    said = capsys.readouterr().out
+    recursion = "RecursionError: maximum recursion depth exceeded while comparing"
+    assert f"plain_0: failed: it cannot be compared with its baseline: {recursion}" in said
+    assert f"plain_1: failed: its own recording: {out / 'plain_1' / 'plain_1.mcap'}: damaged" in said
+    assert "it cannot be drawn: ZeroDivisionError: no extent; both runs cannot be shown" in said
+    assert "Traceback" in (out / "plain_0" / "log.txt").read_text()
+    assert "differ_0" in (out / "index.html").read_text()
+    assert len((out / "history.jsonl").read_text().splitlines()) == 1
+
+
+def test_one_report_that_cannot_be_made_keeps_none_of_the_others(tmp_path, monkeypatch, capsys):
+    prepare(tmp_path, plain=1, bad=0, differing=0)
+    out = tmp_path / "out"
+    (out / "junit.xml").mkdir(parents=True)
+    (out / "junit.xml" / "in_the_way").touch()
+    capsys.readouterr()
+    assert night(tmp_path, out, "--rrd", "none") is ExitCode.INVALID
+    said = capsys.readouterr()
+    assert "junit.xml: cannot be written" in said.err and "1 scenario: 1 same" in said.out
+    assert verdicts_of(out) == {"plain_0": "same"}
+    assert (out / "index.html").is_file() and (out / "history.jsonl").is_file()
+
+
+def test_a_new_baseline_is_told_only_where_one_was_written(tmp_path, capsys):
+    scenes.write(tmp_path / "in", "a", contact="always")
+    scenes.write(tmp_path / "in", "b")
+    scenes.write(tmp_path / "in", "c")
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base" / "c").write_text("where the folder should be")
+    out = tmp_path / "out"
+    assert night(tmp_path, out, "--missing-baseline", "create", "--rrd", "none") is ExitCode.FAILED
+    assert verdicts_of(out) == {"a": "broken", "b": "missing baseline", "c": "missing baseline"}
+    assert "its baseline is new" not in (out / "run.json").read_text() + capsys.readouterr().out
+    (tmp_path / "base" / "c").unlink()
+    assert night(tmp_path, out, "--missing-baseline", "create", "--rrd", "none") is ExitCode.FAILED
+    entries = json.loads((out / "run.json").read_text())["verdicts"]
+    assert {name: entry.get("message", "") for name, entry in entries.items() if name != "a"} == dict.fromkeys(
+        "bc", "its baseline is new"
+    )
+    assert "baseline is new" not in entries["a"]["message"]
+    assert Baseline(tmp_path / "base").names() == ["b", "c"]
+
+
+KILLED = """
+import os, signal, sys
+import replay.batch.regress as regress
+from replay.cli.main import main
+judge = regress._judge
+
+def killing(name, *arguments, **options):
+    if name == "c":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return judge(name, *arguments, **options)
+
+regress._judge = killing
+main(sys.argv[1:])
+"""
+
+
+def test_a_night_that_was_cut_is_carried_on(tmp_path, capsys):
+    for name in "abc":
+        scenes.write(tmp_path / "in", name)
+    out, base = tmp_path / "out", tmp_path / "base"
+    assert night(tmp_path, out, "--missing-baseline", "create", "--rrd", "none") is ExitCode.FINE
+    scenes.write(tmp_path / "in", "b", distance=1.3)
+    arguments = ["regress", str(tmp_path / "in"), "--baseline", str(base), "-o", str(out), "--workers", "1"]
+    assert subprocess.run([sys.executable, "-c", KILLED, *arguments], check=False).returncode == -signal.SIGKILL
+    cut = json.loads((out / "run.json").read_text())
+    assert cut["interrupted"] is True and "verdicts" not in cut  # the night is not over
+    assert {entry["status"] for entry in cut["scenarios"].values()} == {"passed"}
+    assert run(["accept", str(out), "--baseline", str(base), "--yes"]) is ExitCode.INVALID
+    before = {file: file.stat().st_mtime_ns for file in out.glob("*/*.mcap")}
+    capsys.readouterr()
+    assert night(tmp_path, out, "--resume", "--rrd", "none", "--timeout", "60s") is ExitCode.DIFFERENT
+    assert capsys.readouterr().err.count(": reused") == 3
+    assert {file: file.stat().st_mtime_ns for file in out.glob("*/*.mcap")} == before
+    assert verdicts_of(out) == {"a": "same", "b": "different", "c": "same"}
+    assert json.loads((out / "run.json").read_text())["interrupted"] is False
+    assert len((out / "history.jsonl").read_text().splitlines()) == 2
+    (out / "c" / "c.mcap").unlink()
+    assert (
+        night(tmp_path, out, "--resume", "--rrd", "all", "--timeout", "60s") is ExitCode.DIFFERENT
+    )  # now with recordings for eyes
+    assert len(list(out.glob("*/?.rrd"))) == 3
+    assert verdicts_of(out)["c"] == "same"
+
+
+def test_the_page_of_a_night_finds_its_baselines_wherever_both_are_moved(tmp_path):
+    scenes.write(tmp_path / "first" / "in", "a[1]")
+    path = tmp_path / "first" / "in" / "a[1].yaml"
+    path.write_text(path.read_text().replace("name: a[1]", "name: 'a: 50 % #1'"))
+    night(tmp_path / "first", tmp_path / "first" / "out", "--missing-baseline", "create", "--rrd", "none")
+    assert night(tmp_path / "first", tmp_path / "first" / "out", "--rrd", "none") is ExitCode.FINE
+    (tmp_path / "first").rename(tmp_path / "moved elsewhere")
+    out = tmp_path / "moved elsewhere" / "out"
+    page = (out / "index.html").read_text()
+    assert "file:" not in page
+    (address,) = re.findall('href="([^"]*)">baseline<', page)
+    target = urlsplit(urljoin((out / "index.html").as_uri(), address))
+    assert Path(unquote(target.path)).is_file()

@@ -1,5 +1,6 @@
 """`replay diff`: what it prints and writes, and its exit code."""
 
+import itertools
 import json
 import shutil
 from xml.etree import ElementTree
@@ -7,6 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from replay.cli import main
+from replay.comparison import runs
 from replay.comparison.suggest import MARK
 
 
@@ -79,3 +81,68 @@ def test_the_command_applies_rules(folders, tmp_path, run):
     rules.write_text("rules_version: 1\nrules: [{signal: '*', ignore: true, reason: everything may differ}]\n")
     assert run(folders / "a", folders / "b", "--rules", rules)[0] == 0
     assert run(folders / "a", folders / "b", "--rules", rules, "--strict-provenance")[0] == 1
+
+
+def report(folder, **statuses):
+    entries = {name: {"status": status} for name, status in statuses.items()}
+    (folder / "run.json").write_text(json.dumps({"scenarios": entries, "interrupted": False}))
+
+
+def test_of_run_folders_what_their_last_run_made_is_compared(folders, tmp_path, run):
+    """Not what earlier nights left beside it."""
+    for side in "ab":
+        shutil.copytree(folders / side, tmp_path / side)
+    report(tmp_path / "a", same="passed")
+    report(tmp_path / "b", same="broken", new="failed", other="interrupted")
+    code, out, _ = run(tmp_path / "a", tmp_path / "b")
+    assert (code, out) == (0, "same: same: all 55 signals equal in 100 frames\n")
+    report(tmp_path / "b", same="passed", new="passed")
+    assert run(tmp_path / "a", tmp_path / "b")[0] == 1
+    assert run(folders / "a", tmp_path / "b")[1].endswith("0 of 1 scenario differ, 2 missing, 1 extra\n")
+    (tmp_path / "b" / "same" / "same.mcap").unlink()
+    code, out, _ = run(tmp_path / "a", tmp_path / "b")
+    assert (code, "unreadable: same: " in out, "No such file" in out) == (2, True, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", "run.json: is not one that replay wrote"),
+        ("{", "run.json: is not one that replay wrote"),
+        ('{"scenarios": {"same": 3}}', "run.json: is not one that replay wrote"),
+        ("[" * 100_000, "run.json: is not one that replay wrote"),
+        (
+            '{"scenarios": {"../a/same": {"status": "passed"}}, "interrupted": false}',
+            "'../a/same' is no scenario's name",
+        ),
+        ('{"scenarios": {"same": {"status": "interrupted"}}, "interrupted": true}', "its run.json lists no recording"),
+    ],
+)
+def test_a_run_json_of_another_kind_is_one_line(folders, tmp_path, run, text, message):
+    shutil.copytree(folders / "b", tmp_path / "b")
+    (tmp_path / "b" / "run.json").write_text(text)
+    code, _, err = run(folders / "a", tmp_path / "b")
+    assert (code, message in err, err.count("\n")) == (2, True, 1)
+
+
+def test_a_recording_that_is_replaced_while_it_is_read_is_read_again(folders, tmp_path, run, monkeypatch):
+    shutil.copytree(folders / "b", tmp_path / "b")
+    mine, count = tmp_path / "b" / "other" / "other.mcap", iter(range(100))
+    same = (folders / "a" / "other" / "other.mcap").read_bytes()
+    read = runs.read
+
+    def replacing(path, **options):
+        if str(path) == str(mine) and next(count) < replaced:
+            new = tmp_path / "new"
+            new.write_bytes(same)
+            new.replace(mine)
+        return read(path, **options)
+
+    monkeypatch.setattr(runs, "read", replacing)
+    replaced = 1
+    assert run(folders / "a" / "other" / "other.mcap", mine)[0] == 0
+    replaced, changing = 100, itertools.count()
+    shutil.copy(folders / "b" / "other" / "other.mcap", mine)
+    monkeypatch.setattr(runs, "_identity", lambda file: (next(changing),))
+    code, _, err = run(folders / "a" / "other" / "other.mcap", mine)
+    assert (code, "is replaced by another process while it is read" in err) == (2, True)
