@@ -56,7 +56,6 @@ type: $(VENV)/.test  ## check types
 schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
 	$(BIN)/python -m replay.comparison.rules_file
-	cd schemas && ../$(BIN)/python -m grpc_tools.protoc -I. --descriptor_set_out=../replay/recording/replay.binpb *.proto
 
 bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'

@@ -57,10 +57,17 @@ _ROOMS = (
 __all__ = [*_PUBLIC, *_ROOMS]  # noqa: PLE0604
 
 
-def submodules(package: str) -> Callable[[str], Any]:
-    """Return a package's `__getattr__` that imports its modules on first use: `replay.collision.gjk` just works."""
+def submodules(package: str, **public: str) -> Callable[[str], Any]:
+    """Return a package's `__getattr__` that imports its modules on first use: `replay.collision.gjk` just works.
+
+    Args:
+        package: its name.
+        public: the module of each name that the package itself offers.
+    """
 
     def resolve(name: str) -> Any:
+        if name in public:
+            return getattr(importlib.import_module(f"{package}.{public[name]}"), name)
         if not name.startswith("_") and importlib.util.find_spec(f"{package}.{name}"):
             return importlib.import_module(f"{package}.{name}")
         raise AttributeError(f"module {package!r} has no attribute {name!r}")

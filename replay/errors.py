@@ -118,6 +118,10 @@ class RecordingError(ReplayError):
         super().__init__(f"{file}: {reason}")
 
 
+class LimitError(RecordingError):
+    """A recording or log holds more than is read of it, see `replay.limits`; no part of it is salvaged."""
+
+
 class ForeignLogError(RecordingError):
     """An MCAP file that others wrote, where a recording of `replay` is meant."""
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
 from replay.scenario.layout import Layout
-from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.sensing.kinds import KINDS, of_kind
 
 if TYPE_CHECKING:
     from replay.collision.pipeline import CollisionPipeline
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.scenario.scene import Scene
-    from replay.sensing.capacitive import CapacitiveSuite
-    from replay.sensing.distance import DistanceSuite
+    from replay.sensing.kind import Suite
 
 __all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "simulate"]
 
@@ -34,7 +33,7 @@ BLOCK_FRAMES = 256
 
 @dataclass(frozen=True, eq=False)
 class FrameBlock:
-    """n consecutive frames: poses, and one group of columns for each thing that the scene asks for (else None).
+    """n consecutive frames: poses, and one group of columns for each thing that the scene asks for.
 
     Attributes:
         layout: the names behind the columns.
@@ -43,6 +42,8 @@ class FrameBlock:
         joint_positions: (n, J) [rad or m].
         joint_velocities: (n, J) [rad/s or m/s].
         link_poses: (n, L, 4, 4), T_world_link.
+        collision: None when the scene tests no pair.
+        readings: columns of the sensors by kind, also by name as `block.distance`, None when there are none.
     """
 
     layout: Layout
@@ -52,8 +53,10 @@ class FrameBlock:
     joint_velocities: Floats
     link_poses: Floats
     collision: CollisionColumns | None
-    distance: DistanceColumns | None
-    capacitive: CapacitiveColumns | None
+    readings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getattr__(self, kind: str) -> Any:
+        return of_kind(self, kind, "readings")
 
     @cached_property
     def link_quaternions(self) -> Floats:
@@ -78,8 +81,14 @@ class Simulation:
         self.scene = scene
         self._motion = plan(scene.linkage, scene.script)
         self.collision = _collision(scene)
-        self.distance = _distance(scene)
-        self.capacitive = _capacitive(scene)
+        self.suites: dict[str, Suite] = {
+            kind: KINDS[kind].suite(sensors, scene.targets, getattr(scene.model, kind), savings=scene.savings)
+            for kind, sensors in scene.sensors.items()
+            if sensors
+        }
+
+    def __getattr__(self, kind: str) -> Any:
+        return of_kind(self, kind, "suites")
 
     def block(self, first: int) -> FrameBlock:
         """Return the block that begins at a frame; it depends on no other block."""
@@ -94,8 +103,7 @@ class Simulation:
             joint_velocities=states.velocities,
             link_poses=poses.world,
             collision=self.collision.run(poses) if self.collision else None,
-            distance=self.distance.run(poses) if self.distance else None,
-            capacitive=self.capacitive.run(poses) if self.capacitive else None,
+            readings={kind: suite.run(poses) for kind, suite in self.suites.items()},
         )
 
     def blocks(self) -> Iterator[FrameBlock]:
@@ -144,37 +152,5 @@ def _collision(scene: Scene) -> CollisionPipeline | None:
         pieces=version.pieces,
         clearance=version.clearance,
         margin=scene.margin,
-        savings=scene.savings,
-    )
-
-
-def _distance(scene: Scene) -> DistanceSuite | None:
-    if not scene.distance_sensors:
-        return None
-    from replay.sensing.distance import DistanceSuite
-
-    model = scene.model
-    return DistanceSuite(
-        scene.distance_sensors,
-        scene.targets,
-        method=model.distance.method,
-        count=model.ray_count,
-        engine=model.ray_engine,
-        savings=scene.savings,
-    )
-
-
-def _capacitive(scene: Scene) -> CapacitiveSuite | None:
-    if not scene.capacitive_sensors:
-        return None
-    from replay.sensing.capacitive import CapacitiveSuite
-
-    model = scene.model
-    return CapacitiveSuite(
-        scene.capacitive_sensors,
-        scene.targets,
-        method=model.capacitive.method,
-        rtol=model.rtol,
-        splits=model.splits,
         savings=scene.savings,
     )

@@ -12,7 +12,11 @@ import replay
 PACKAGE = Path(replay.__file__).parent
 ROOMS = (
     "errors",
+    "lfs_pointer",
+    "limits",
+    "json_text",
     "numerics",
+    "language",
     "geometry",
     "logs",
     "kinematics",

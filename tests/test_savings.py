@@ -13,8 +13,10 @@ from replay.geometry.primitives import cuboid
 from replay.recording.reader import read
 from replay.recording.record import record
 from replay.scenario.load import load, load_cases
-from replay.scenario.methods import CapacitiveMethod, CollisionMethod, DistanceMethod, Model
+from replay.scenario.methods import CollisionMethod, Model
 from replay.scenario.scene import build
+from replay.sensing.capacitive.part import CapacitiveMethod
+from replay.sensing.distance.part import DistanceMethod
 from replay.simulation import Simulation
 from tests.collision.scenes import free_links
 
@@ -63,7 +65,7 @@ def test_shipped_scenarios_read_the_same(path):
     for scenario in load_cases(path):
         frames = 37  # 6 Hz, with what stands still for longer than that
         (saving, columns), (full, others) = both(thinned(scenario, frames))
-        compare(columns, others, saving.scene.model.rtol)
+        compare(columns, others, saving.scene.model.capacitive.options()["rtol"])
         assert (full.collision.counters.narrow, full.collision.counters.repeated) == (
             columns["collision.level"].size,
             0,
@@ -127,7 +129,7 @@ MODELS = {
 def test_models_read_the_same(dwells, name):
     model = MODELS[name]
     (_, columns), (_, others) = both(dwells, model)
-    compare(columns, others, model.rtol if model.capacitive.method == "tree" else 0.0)
+    compare(columns, others, model.capacitive.options().get("rtol", 0.0))
     assert (columns["collision.level"] == 2).any()
     assert (columns["collision.level"] == 0).any()
     assert np.isfinite(columns["distance.distance"][:, 1]).all()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import datetime
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 from replay.batch.baseline import Baseline, Entry, check_name, check_scenario
 from replay.batch.case import Status
+from replay.batch.written import read_run
 from replay.comparison import wording
 from replay.comparison.difference import Difference, Verdict
 from replay.comparison.provenance import FILES
@@ -51,12 +51,11 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
         RecordingError: a recording of the run cannot be read, is a link, or is of another scenario.
     """
     try:
-        run = json.loads((directory / "run.json").read_text(encoding="utf-8"))
-        statuses = {str(name): Status(entry["status"]) for name, entry in run["scenarios"].items()}
-        interrupted = bool(run["interrupted"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        run = read_run(directory)
+        statuses = {name: Status(entry["status"]) for name, entry in run["scenarios"].items()}
+    except (OSError, ValueError):
         raise InvalidValue("RUNDIR", directory, "is no run folder: it has no run.json of replay") from None
-    if interrupted:
+    if run["interrupted"]:
         rule = "holds a run that was interrupted; run it again (`replay run --resume` keeps what is done)"
         raise InvalidValue("RUNDIR", directory, rule)
     failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]

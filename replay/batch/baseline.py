@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.errors import InvalidValue, RecordingError
+from replay.language.fields import is_title
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import append_lines, json_line, refuse_link, write_error
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, is_digest, write_slim
-from replay.scenario.fields import is_title
 
 LOG = "accepted.jsonl"
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
-from replay.scenario.covered import CoveredSensors
 from replay.scenario.verdict import ExpectationCheck, Outcome
 
 if TYPE_CHECKING:
+    from replay.batch.written import WrittenResult
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -107,8 +107,8 @@ class CaseResult:
         }
 
     @staticmethod
-    def from_json(values: dict[str, Any], recordings: RecordedPaths) -> CaseResult:
-        """Return the result that `as_json` wrote, as one that is reused; KeyError, TypeError or ValueError if none."""
+    def from_json(values: WrittenResult, recordings: RecordedPaths) -> CaseResult:
+        """Return the result that `as_json` wrote, as one that is reused; ValueError if its status is none."""
         return CaseResult(
             name=values["scenario"],
             status=Status(values["status"]),
@@ -134,8 +134,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check = scene.expectation_check()
-        covered = CoveredSensors(scene.layout)
-        blocks = _checked(simulation.blocks(), check, covered)
+        blocks = _checked(simulation.blocks(), check)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -156,7 +155,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *covered.notes(), *(simulation.distance.notes() if simulation.distance else ())),
+        notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
     )
 
 
@@ -173,8 +172,7 @@ def describe(result: CaseResult) -> list[str]:
     return lines
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, covered: CoveredSensors) -> Iterator[FrameBlock]:
+def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
     for block in blocks:
-        covered.update(block.distance)
-        check.update(block.time, block.collision, block.distance, block.capacitive)
+        check.update(block.time, block.collision, block.readings)
         yield block

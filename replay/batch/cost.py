@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from replay.scenario.model import Scenario
 from replay.scenario.shapes import Mesh
+from replay.sensing.kinds import KINDS
 
 _BYTES_PER_TRIANGLE = 50  # of a binary STL file
 _TRIANGLES_OF_A_PRIMITIVE = 100
@@ -24,6 +23,8 @@ def expected_cost(scenario: Scenario) -> float:
     triangles = len(shapes) * _TRIANGLES_OF_A_PRIMITIVE
     triangles += sum(len(scenario.sources.get(mesh, b"")) for mesh in meshes) // _BYTES_PER_TRIANGLE
     pairs = colliding * (colliding - 1) / 2
-    plates = sum(len(sensor.plates) for sensor in scenario.sensors.capacitive.values())
-    frame = 10.0 + pairs + 20.0 * len(scenario.sensors.distance) + 5.0 * plates * math.sqrt(triangles)
+    sensors = (
+        kind.cost(sensor, triangles) for kind in KINDS.values() for sensor in scenario.sensors.of(kind.name).values()
+    )
+    frame = 10.0 + pairs + sum(sensors)
     return scenario.frames * frame + 10.0 * triangles

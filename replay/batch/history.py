@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from replay import limits
+from replay.batch.written import read_night
 from replay.errors import WriteError
 from replay.logs.part_file import append_lines, json_line
 
@@ -26,6 +26,8 @@ def read_history(path: Path) -> list[Night]:
     """Return all nights in the order of the file; lines that cannot be read, as a crash leaves them, are left out."""
     nights = []
     try:
+        if path.stat().st_size > limits.HISTORY:
+            raise WriteError(str(path), f"it has more than {limits.HISTORY} bytes: begin a new one")
         lines = path.read_text(encoding="utf-8").splitlines()
     except (FileNotFoundError, NotADirectoryError):
         return []
@@ -34,11 +36,10 @@ def read_history(path: Path) -> list[Night]:
         raise WriteError(str(path), f"it cannot be read before it is appended to: {reason}") from None
     for line in lines:
         try:
-            entry: dict[str, Any] = json.loads(line)
-            failing = frozenset(entry["failing"])
-            nights.append(Night(str(entry["time"]), str(entry["version"]), dict(entry["verdicts"]), failing))
-        except (KeyError, TypeError, ValueError):
+            entry = read_night(line)
+        except ValueError:
             continue
+        nights.append(Night(entry["time"], entry["version"], entry["verdicts"], frozenset(entry["failing"])))
     return nights
 
 

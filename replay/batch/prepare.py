@@ -8,18 +8,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from replay.batch.worker import Messages
-from replay.scenario.methods import CapacitiveMethod, DistanceMethod, Model
+from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
+from replay.sensing.kinds import KINDS
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What scenarios compute, and by which methods; numbers that do not change what is compiled are left out."""
+    """What scenarios compute, and by which methods; numbers that do not change what is compiled are left out.
+
+    Attributes:
+        sensors: the kinds of sensors.
+    """
 
     model: Model
     collision: bool
-    distance: bool
-    capacitive: bool
+    sensors: frozenset[str]
     meshes: bool
 
 
@@ -29,8 +33,7 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
         Needs(
             _methods(model or scenario.model),
             collision=scenario.collision.pairs == "all",
-            distance=bool(scenario.sensors.distance),
-            capacitive=bool(scenario.sensors.capacitive),
+            sensors=frozenset(kind for kind in KINDS if scenario.sensors.of(kind)),
             meshes=bool(scenario.provenance.meshes),
         )
         for scenario in scenarios
@@ -39,10 +42,8 @@ def needs_of(scenarios: Sequence[Scenario], model: Model | None) -> tuple[Needs,
 
 
 def _methods(model: Model) -> Model:
-    distance = DistanceMethod(method=model.distance.method, engine=model.distance.engine)
-    return Model(
-        collision=model.collision, distance=distance, capacitive=CapacitiveMethod(method=model.capacitive.method)
-    )
+    words = {kind: {key: value for key, value in getattr(model, kind) if isinstance(value, str)} for kind in KINDS}
+    return Model(collision=model.collision, **{kind: KINDS[kind].method(**words[kind]) for kind in KINDS})
 
 
 def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
@@ -62,14 +63,9 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
         found += pipeline.kernels(
             bounds=version.bounds, narrowphase=version.narrowphase, pieces=version.pieces, savings=savings
         )
-    if needs.distance:
-        from replay.sensing.distance import suite as distance
-
-        found += distance.kernels(method=model.distance.method, engine=model.ray_engine, savings=savings)
-    if needs.capacitive:
-        from replay.sensing.capacitive import suite as capacitive
-
-        found += capacitive.kernels(method=model.capacitive.method, savings=savings)
+    for name, kind in KINDS.items():
+        if name in needs.sensors:
+            found += kind.kernels(getattr(model, name), savings=savings)
     return found
 
 

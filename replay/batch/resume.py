@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 from replay.batch.case import CaseResult
+from replay.batch.written import RESULT, read_result
 from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import code_identity, library_versions
@@ -14,8 +14,6 @@ from replay.recording.reader import read_files, read_provenance
 from replay.recording.record import RecordedPaths
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
-
-RESULT = "result.json"
 
 
 def earlier_result(
@@ -42,10 +40,10 @@ def earlier_result(
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)
             read_files(log, found)  # are those that it states
-        result = CaseResult.from_json(json.loads((folder / RESULT).read_text(encoding="utf-8")), paths)
+        result = CaseResult.from_json(read_result(folder / RESULT), paths)
     except RecordingError as error:
         return error.reason
-    except (OSError, KeyError, TypeError, ValueError):
+    except (OSError, ValueError):
         return f"{RESULT} is not one that replay wrote"
     if result.name != scenario.name or not result.status.recorded or result.frames != found.frames:
         return f"{RESULT} belongs to another recording"

@@ -24,8 +24,10 @@ from replay.batch.case import CaseOrder, CaseResult, Status, describe, run_case
 from replay.batch.cost import expected_cost
 from replay.batch.pool import Ended, Ending, Pool, Task
 from replay.batch.prepare import PrepareKernels, needs_of
-from replay.batch.resume import RESULT, earlier_result
+from replay.batch.resume import earlier_result
+from replay.batch.tls import Certificates
 from replay.batch.watch import Unwatched, Watch
+from replay.batch.written import RESULT
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError, printable
 from replay.logs.part_file import append_lines, refuse_link, write_file
 from replay.scenario.methods import Model
@@ -43,12 +45,14 @@ class Execution:
         timeout: longest time of one scenario [s]; None for none.
         memory: most resident memory of one scenario [bytes]; None for any.
         dask: address of a Dask scheduler that runs them instead of this machine.
+        certificates: for TLS with that scheduler; `distributed`'s own configuration if None.
     """
 
     workers: int | None = None
     timeout: float | None = None
     memory: int | None = None
     dask: str | None = None
+    certificates: Certificates | None = None
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,7 @@ def run_all(
     if execution.dask is not None:  # before anything is written
         from replay.batch.cluster import check_address
 
-        check_address(execution.dask)
+        check_address(execution.dask, execution.certificates)
     started = datetime.datetime.now(datetime.UTC)
     results: dict[str, CaseResult] = {}
     if resume:
@@ -194,7 +198,8 @@ def _endings(tasks: Sequence[Task], workers: int, execution: Execution, watch: W
     if execution.dask is not None:
         from replay.batch.cluster import Cluster
 
-        yield from Cluster(execution.dask, run_case, **limits).run(tasks)
+        cluster = Cluster(execution.dask, run_case, certificates=execution.certificates, tell=watch.tell, **limits)
+        yield from cluster.run(tasks)
     else:
         pool = Pool(run_case, workers=workers, helpers=cores, tell=watch.tell, preparing=watch.prepare, **limits)
         yield from pool.run(tasks)

@@ -14,7 +14,7 @@ from replay.batch.case import CaseResult, Status
 from replay.batch.folders import look_through
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
-from replay.logs.lfs_pointer import is_lfs_pointer
+from replay.lfs_pointer import is_lfs_pointer
 from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
 

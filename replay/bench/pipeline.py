@@ -19,8 +19,9 @@ from replay.bench.runner import Readings, Runner
 from replay.errors import ScenarioError
 from replay.scenario.layout import Layout
 from replay.scenario.load import load, load_model
-from replay.scenario.methods import CapacitiveMethod, Model
+from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
+from replay.sensing.capacitive.part import CapacitiveMethod
 
 CASE = "C-arm, 26 756 triangles, 4 cones, 6 x 3 plates"
 DEFAULT, FAST, THESIS, PEER = "replay, rtol 1e-6", "replay, rtol 1e-4", "replay, thesis2015", "fcl + embreex + NumPy"

@@ -22,8 +22,7 @@ from replay.scenario.layout import Layout
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.scene import build
-from replay.sensing.capacitive import CapacitiveSuite
-from replay.sensing.distance import DistanceSuite
+from replay.sensing.kinds import KINDS
 from replay.simulation import BLOCK_FRAMES, FrameBlock, Simulation
 
 Floats = NDArray[np.float64]
@@ -110,12 +109,10 @@ class Runner:
         scene = self.simulation.scene
         model = scene.model
         suites: dict[str, Any] = {
-            sensor.name: DistanceSuite([sensor], scene.targets, method=model.distance.method)
-            for sensor in scene.distance_sensors
+            sensor.name: KINDS[kind].suite([sensor], scene.targets, getattr(model, kind), savings=True)
+            for kind, sensors in scene.sensors.items()
+            for sensor in sensors
         }
-        for felt in scene.capacitive_sensors:
-            options: dict[str, Any] = {"method": model.capacitive.method, "rtol": model.rtol}
-            suites[felt.name] = CapacitiveSuite([felt], scene.targets, **options)
         blocks = [self.poses(frames[k : k + BLOCK_FRAMES]) for k in range(0, len(frames), BLOCK_FRAMES)]
         spent = {}
         for name, suite in suites.items():
@@ -142,8 +139,7 @@ class Runner:
                     joint_velocities=states.velocities[chosen[part]],
                     link_poses=found["kinematics"].world,
                     collision=found["collision"],
-                    distance=found["distance"],
-                    capacitive=found["capacitive"],
+                    readings={kind: found[kind] for kind in self.simulation.suites},
                 )
             )
         spent = math.inf

@@ -55,7 +55,7 @@ def run(*, quick: bool = False, frames: int | None = None, scene: Scenario | Non
     share = count / len(few)
     report.grids[RULES] = Grid([*_collision(saving.simulation.scene, done, without, share), *_sensors(done)])
     report.grids[TIMES] = _times(saving.seconds, count, full.seconds, len(few))
-    lines, wrong = compare(blocks, others, few, model.rtol)
+    lines, wrong = compare(blocks, others, few, model.capacitive.options()["rtol"])
     report.grids[SAME] = Grid(lines)
     report.goals.append(Goal("savings.same", float(wrong)))
     report.notes.append(f"{name}: {count} frames with savings, {len(few)} of them without.")

@@ -40,7 +40,10 @@ _EXECUTION = (
     click.option("--workers", type=Workers(), help="Processes; as many as there are cores when left out."),
     click.option("--timeout", type=Seconds(), help="Longest time of one scenario, such as 90s or 10min."),
     click.option("--memory", type=Memory(), help="Most resident memory of one scenario, such as 2GiB."),
-    click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead."),
+    click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead; it is trusted."),
+    click.option("--dask-ca", type=PathName(), help="TLS: certificate of the authority that the cluster is known by."),
+    click.option("--dask-cert", type=PathName(), help="TLS: our certificate, signed by that authority."),
+    click.option("--dask-key", type=PathName(), help="TLS: its private key, if it is in a file of its own."),
 )
 
 
@@ -51,7 +54,7 @@ def output_option(default: str) -> Callable[[Command], Command]:
 
 
 def execution_options(command: Command) -> Command:
-    """Add what `batch.run.Execution` takes: workers, timeout, memory, dask."""
+    """Add what `batch.run.Execution` takes: workers, timeout, memory, dask and its certificates."""
     for option in reversed(_EXECUTION):
         command = option(command)
     return command
@@ -60,9 +63,14 @@ def execution_options(command: Command) -> Command:
 def settings(options: dict[str, Any]) -> dict[str, Any]:
     """Return `model` and `execution` of a run as the options name them."""
     from replay.batch.run import Execution
+    from replay.batch.tls import Certificates
     from replay.scenario.load import load_model
 
-    execution = Execution(**{name: options[name] for name in ("workers", "timeout", "memory", "dask")})
+    certificates = Certificates.of(*(options[name] for name in ("dask_ca", "dask_cert", "dask_key")))
+    if certificates is not None and options["dask"] is None:
+        raise click.UsageError("--dask-ca, --dask-cert and --dask-key belong to --dask")
+    how = {name: options[name] for name in ("workers", "timeout", "memory", "dask")}
+    execution = Execution(**how, certificates=certificates)
     return {"model": None if options["model"] is None else load_model(options["model"]), "execution": execution}
 
 

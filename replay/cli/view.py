@@ -22,6 +22,7 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
     from replay.recording.picture import picture
     from replay.recording.side_by_side import one_recording
     from replay.recording.viewer import rerun_files, show
+    from replay.recording.web_page import serve
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at belongs to --screenshot")
@@ -32,8 +33,11 @@ def view(recordings: tuple[Path, ...], screenshot: Path | None, at: float | None
     if screenshot is not None and web:
         raise click.UsageError("--screenshot and --web exclude each other")
     with one_recording(rerun_files(recordings)) as file:
-        if screenshot is None:
-            show(file, web=web)
+        if web:
+            names = ", ".join(path.name for path in recordings)
+            serve(file, lambda address: put([f"{address} shows {names} until Ctrl-C"]))
+        elif screenshot is None:
+            show(file)
         else:
             picture(file, screenshot, at=at)
             put([str(screenshot)])

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+
+from replay.numerics.columns import Columns, Field
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
+
+_LEVELS = {"bounds": 3, "contact": 4}
+_CHART = "Clearance of pairs that are near [m]"
 
 
 class Level(enum.IntEnum):
@@ -23,7 +29,7 @@ class Level(enum.IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class CollisionColumns:
+class CollisionColumns(Columns):
     """Collision results of n frames and P pairs.
 
     Attributes:
@@ -33,10 +39,10 @@ class CollisionColumns:
         undecided: (n, P) bool, whether GJK reached its accuracy limit; the level is then contact, for safety.
     """
 
-    level: Bytes
-    clearance: Floats
-    evaluated: Flags
-    undecided: Flags
+    level: Annotated[Bytes, Field(states=Level, each="pairs", events=_LEVELS, begins=("overlap of bounds", "contact"))]
+    clearance: Annotated[Floats, Field(unit="m", each="pairs", gate="evaluated", chart=_CHART)]
+    evaluated: Annotated[Flags, Field(each="pairs", open=(1,), begins=("evaluation of the clearance",))]
+    undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from replay.comparison import difference as result
 from replay.comparison.events import Matched, Track, match, tracks
 from replay.comparison.numbers import Errors, Flags, compare_numbers, compare_rotations
 from replay.comparison.rules import Rule, Rules, Tolerance
-from replay.comparison.signals import Column, Field, Group, Kind, Signal, unify_categories
+from replay.comparison.signals import Column, Group, Signal, unify_categories
+from replay.numerics.columns import Field, Kind
 
 Indices = NDArray[np.int64]
 

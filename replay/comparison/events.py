@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.comparison.signals import Column, Field, Kind
+from replay.comparison.signals import Column
+from replay.numerics.columns import Field, Kind
 
 Frames = NDArray[np.int64]
 

@@ -8,19 +8,20 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.message import DecodeError
 
+from replay import limits
 from replay.comparison.difference import Change
+from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import Chunk
-from replay.logs.protobuf import message_type
+from replay.logs.protobuf import fields_of, message_type
 from replay.recording import messages
 
 SCENE = "/scene"
 """The topic of the scene; begins the name of a body in changes and rules: `/scene/arc/bow`."""
 SCHEMAS = "/schemas"
 """Begins the name of a field in changes and rules: `/schemas/collision/clearance`."""
-
-_MAX_DEPTH = 32
 
 
 def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
@@ -120,8 +121,18 @@ def _scene(log: McapLog) -> Any:
     for chunk in log.chunks if channels else ():
         for run in log.runs(chunk):
             if run.channel in channels:
-                return messages.message_class(messages.SCENE).FromString(run.messages()[-1])
+                return _decoded(log, run.messages()[-1])
     return None
+
+
+def _decoded(log: McapLog, data: bytes) -> Any:
+    """Return a scene; RecordingError where it is none, or larger than is read of a file of its size."""
+    if len(data) > limits.scene(log.size):
+        raise LimitError(str(log.path), f"has a scene of {len(data)} bytes; at most {limits.scene(log.size)} are read")
+    try:
+        return messages.message_class(messages.SCENE).FromString(data)
+    except DecodeError as error:
+        raise RecordingError(str(log.path), f"damaged: topic {SCENE!r} holds no scene: {error}") from None
 
 
 def _bodies(log: McapLog) -> dict[str, str] | None:
@@ -145,16 +156,10 @@ def _fields(log: McapLog) -> dict[str, str]:
             continue
         descriptor = message_type(str(log.path), schema.name, schema.data).DESCRIPTOR
         found[f"{channel.topic} schema"] = schema.name
-        found |= {f"{channel.topic} {path}": kind for path, kind in _flat(descriptor, "", 0)}
+        for path, field in fields_of(str(log.path), descriptor):
+            kind = f"field {field.number}, {_KINDS[field.type]}{' array' if field.is_repeated else ''}"
+            found[f"{channel.topic} {path}"] = kind
     return found
-
-
-def _flat(descriptor: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
-    for field in descriptor.fields:
-        path = f"{prefix}{field.name}"
-        yield path, f"field {field.number}, {_KINDS[field.type]}{' array' if field.is_repeated else ''}"
-        if field.message_type is not None and depth < _MAX_DEPTH:
-            yield from _flat(field.message_type, f"{path}.", depth + 1)
 
 
 _KINDS = {

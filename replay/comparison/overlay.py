@@ -98,7 +98,8 @@ def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool =
         marks = sorted(_marks(case), key=lambda mark: mark.at.time)
         shown = case.difference.signals[:CURVES]
         blueprint = _blueprint(marks, list(dict.fromkeys(map(_chart, shown))), eye)
-        stream = file.open(APPLICATION, default_blueprint=blueprint)
+        stream = file.open(APPLICATION)
+        file.arrange(blueprint)
         stream.send_recording_name(f"{case.name}: baseline and candidate")
         summary = text(RunDifference(str(case.baseline), str(case.candidate), (case,)), verbose=True)
         stream.log("summary", rr.TextDocument(summary), static=True)

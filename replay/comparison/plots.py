@@ -13,7 +13,8 @@ from replay.comparison.difference import Difference, SignalDifference
 from replay.comparison.numbers import compare_numbers, compare_rotations
 from replay.comparison.rules import EXACT, Rules
 from replay.comparison.runs import Pair
-from replay.comparison.signals import Column, Kind, groups, unify_categories
+from replay.comparison.signals import Column, groups, unify_categories
+from replay.numerics.columns import Kind
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import datetime
 import json
-import math
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -17,10 +17,10 @@ from pydantic import AfterValidator, PlainValidator, ValidationError, WithJsonSc
 
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.errors import InvalidValue, Problem, ScenarioError
-from replay.scenario.fields import Flag, Part, Text, rejected
+from replay.language.fields import Flag, Part, Text, rejected
+from replay.language.units import TIME, Quantity
 from replay.scenario.problems import translate
 from replay.scenario.source import Folder, SourceRule, locate
-from replay.scenario.units import TIME, Quantity
 from replay.scenario.yaml_text import Node, parse
 
 SCHEMA_FILE: Final = "rules.schema.json"
@@ -48,7 +48,7 @@ def _shift(value: object) -> Shift:
 
 
 def _bound(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= sys.float_info.max:
         raise rejected("must be a number that is not negative, in the signal's SI unit")
     return float(value)
 

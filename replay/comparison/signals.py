@@ -12,7 +12,6 @@ A signal is one scalar column: (topic, field, name). Its full name joins them wi
 from __future__ import annotations
 
 import dataclasses
-import enum
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -20,47 +19,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.collision.columns import CollisionColumns
+from replay.numerics.columns import Field, Kind, components
+from replay.sensing.kinds import KINDS
+
 if TYPE_CHECKING:
     from replay.recording.reader import Recording
     from replay.simulation import Layout
 
 Column = NDArray[Any]
-
-
-class Kind(enum.Enum):
-    """How the values of a field are compared."""
-
-    NUMBER = "number"
-    ROTATION = "rotation"  # quaternions xyzw, by the angle between them
-    LEVEL = "level"  # ordered states 0, 1, 2; an event when a state or a higher one begins or ends
-    FLAG = "flag"  # false or true; an event when it begins or ends
-    CATEGORY = "category"  # unordered states; an event when the state becomes another
-
-    @property
-    def is_state(self) -> bool:
-        """Whether the field is compared as events rather than as numbers."""
-        return self in (Kind.LEVEL, Kind.FLAG, Kind.CATEGORY)
-
-
-@dataclass(frozen=True)
-class Field:
-    """One field of a topic.
-
-    Attributes:
-        name: as it stands in a signal's full name.
-        unit: of its values; "" when they have none.
-        gate: the field that says whether this one has a value at all, such as `status` for `distance`. In frames in
-            which the gates of two runs disagree, the gate's event is the difference and this field's is its echo.
-        open: states of a gate in which the fields behind it have a value.
-        begins: names of the states from 1 on, for events: "contact" gives "contact begins" and "contact ends".
-    """
-
-    name: str
-    kind: Kind = Kind.NUMBER
-    unit: str = ""
-    gate: str | None = None
-    open: tuple[int, ...] = ()
-    begins: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, order=True, slots=True)
@@ -108,24 +75,6 @@ class Group:
 JOINT_FIELDS = (Field("position"), Field("velocity"))
 TRANSLATION_FIELDS = tuple(Field(f"translation.{axis}", unit="m") for axis in "xyz")
 ROTATION_FIELD = Field("rotation", Kind.ROTATION, "rad")
-COLLISION_FIELDS = (
-    Field("level", Kind.LEVEL, begins=("overlap of bounds", "contact")),
-    Field("evaluated", Kind.FLAG, open=(1,), begins=("evaluation of the clearance",)),
-    Field("undecided", Kind.FLAG, begins=("undecided",)),
-    Field("clearance", unit="m", gate="evaluated"),
-)
-STATUS_FIELD = Field("status", Kind.LEVEL, open=(1, 2), begins=("detection", "too close"))
-DISTANCE_FIELD = Field("distance", unit="m", gate="status")
-POINT_FIELDS = (("point", "m"), ("point_sensor", "m"), ("normal", ""))
-INDEX_FIELDS = tuple(Field(name, Kind.CATEGORY, gate="status") for name in ("shape", "triangle", "case"))
-CAPACITIVE_FIELDS = (
-    Field("saturated", Kind.FLAG, open=(0,), begins=("saturation",)),
-    Field("touching", Kind.FLAG, begins=("touch",)),
-    Field("capacitance", unit="F", gate="saturated"),
-    Field("output_voltage", unit="V", gate="saturated"),
-    Field("delta_output", unit="V", gate="saturated"),
-)
-PER_OBJECT_FIELD = Field("per_object", unit="F", gate="saturated")
 
 
 def groups(recording: Recording) -> Iterator[Group]:
@@ -146,48 +95,28 @@ def _all_groups(recording: Recording) -> Iterator[Group]:
     for axis, field_ in enumerate(TRANSLATION_FIELDS):
         yield Group(field_, _signals("/tf", field_, layout.links), recording.link_poses[:, :, axis, 3])
     yield Group(ROTATION_FIELD, _signals("/tf", ROTATION_FIELD, layout.links), recording.link_quaternions)
-    yield from _collision(recording)
-    yield from _distance(recording)
-    yield from _capacitive(recording)
+    if recording.collision is not None:
+        for field_ in _gates_first(recording.collision.fields()):
+            signals = _signals("/collision", field_, layout.pairs)
+            yield Group(field_, signals, getattr(recording.collision, field_.name))
+    for kind, columns in recording.readings.items():
+        topics = [KINDS[kind].topic(sensor) for sensor in layout.sensors[kind]]
+        for field_ in _gates_first(columns.fields()):
+            yield from _of_sensors(topics, field_, getattr(columns, field_.name), layout)
 
 
-def _collision(recording: Recording) -> Iterator[Group]:
-    if recording.collision is None:
-        return
-    for field_ in COLLISION_FIELDS:
-        signals = _signals("/collision", field_, recording.layout.pairs)
-        yield Group(field_, signals, getattr(recording.collision, field_.name))
+def _gates_first(fields: Sequence[Field]) -> list[Field]:
+    return sorted(fields, key=lambda field_: field_.gate is not None)
 
 
-def _distance(recording: Recording) -> Iterator[Group]:
-    columns = recording.distance
-    if columns is None:
-        return
-    topics = [f"/distance/{sensor}" for sensor in recording.layout.distance_sensors]
-    for field_ in (STATUS_FIELD, DISTANCE_FIELD):
-        yield Group(field_, _per_topic(topics, field_), getattr(columns, field_.name))
-    for name, unit in POINT_FIELDS:
-        for axis, letter in enumerate("xyz"):
-            field_ = Field(f"{name}.{letter}", unit=unit, gate="status")
-            yield Group(field_, _per_topic(topics, field_), getattr(columns, name)[:, :, axis])
-    for field_ in INDEX_FIELDS:
-        shapes = ("nothing", *recording.layout.shapes) if field_.name == "shape" else ()
-        yield Group(field_, _per_topic(topics, field_), getattr(columns, field_.name), shapes)
-
-
-def _capacitive(recording: Recording) -> Iterator[Group]:
-    columns = recording.capacitive
-    if columns is None:
-        return
-    topics = [f"/capacitive/{sensor}" for sensor in recording.layout.capacitive_sensors]
-    for field_ in CAPACITIVE_FIELDS:
-        yield Group(field_, _per_topic(topics, field_), getattr(columns, field_.name))
-    signals = tuple(
-        Signal(topic, PER_OBJECT_FIELD.name, shape, PER_OBJECT_FIELD.unit)
-        for topic in topics
-        for shape in recording.layout.objects
-    )
-    yield Group(PER_OBJECT_FIELD, signals, columns.per_object.reshape(len(columns.per_object), len(signals)))
+def _of_sensors(topics: Sequence[str], field_: Field, values: Column, layout: Layout) -> Iterator[Group]:
+    """Yield a field of all sensors of a kind: a vector letter by letter."""
+    names = getattr(layout, field_.each) if field_.each else ("",)
+    categories = ("nothing", *getattr(layout, field_.names)) if field_.names else ()
+    for name, column in components(field_, values).items():
+        part = dataclasses.replace(field_, name=name)
+        signals = tuple(Signal(topic, name, each, field_.unit) for topic in topics for each in names)
+        yield Group(part, signals, column.reshape(len(column), len(signals)), categories)
 
 
 def places(layout: Layout, topic: str) -> tuple[object, int]:
@@ -195,28 +124,23 @@ def places(layout: Layout, topic: str) -> tuple[object, int]:
 
     Two topics of the same bytes are the same signals when these names are the same.
     """
-    match topic.split("/")[1]:
+    match group := topic.split("/")[1]:
         case "joint_states":
             return (layout.joints, layout.joint_units), len(JOINT_FIELDS) * len(layout.joints)
         case "tf":
             return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
         case "collision":
-            return layout.pairs, len(COLLISION_FIELDS) * len(layout.pairs)
-        case "distance":
-            return layout.shapes, 2 + 3 * len(POINT_FIELDS) + len(INDEX_FIELDS)
-        case "capacitive":
-            return layout.objects, len(CAPACITIVE_FIELDS) + len(layout.objects)
-    return (), 0
+            return layout.pairs, len(CollisionColumns.fields()) * len(layout.pairs)
+    fields = KINDS[group].columns.fields() if group in KINDS else ()
+    meant = {names: getattr(layout, names) for field_ in fields for names in (field_.each, field_.names) if names}
+    counts = (len(meant[field_.each]) if field_.each else len(field_.letters) or 1 for field_ in fields)
+    return meant, sum(counts)
 
 
 def _signals(topic: str, field_: Field, names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Signal, ...]:
     return tuple(
         Signal(topic, field_.name, name, field_.unit if units is None else units[k]) for k, name in enumerate(names)
     )
-
-
-def _per_topic(topics: Sequence[str], field_: Field) -> tuple[Signal, ...]:
-    return tuple(Signal(topic, field_.name, "", field_.unit) for topic in topics)
 
 
 def unify_categories(a: Group, b: Group) -> tuple[Column, Column, tuple[str, ...]]:

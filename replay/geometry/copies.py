@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, sides
+from replay.geometry.winding import Indices, components, sides
 from replay.numerics.rows import distinct_rows
 
 _MOST_TOGETHER = 200  # walls that close something only together
@@ -95,16 +95,12 @@ def _needed(walls: list[_Wall], count: Indices) -> list[_Wall]:
 
 def _walls(faces: Indices, extra: Indices, edges: Indices, count: Indices) -> list[Indices]:
     """Return the copies in groups, smallest first: neighbours across edges of no more than two faces that are kept."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     found = sides(faces[extra])
     keys = found.ends[:, 0] * (int(faces.max()) + 1) + found.ends[:, 1]
     inner = (count[np.searchsorted(edges, keys)] <= 2)[found.edge]
     face, edge = found.face[inner], found.edge[inner]
     links = np.flatnonzero(edge[1:] == edge[:-1])
-    graph = coo_array((np.ones(len(links), np.int8), (face[links], face[links + 1])), shape=(len(extra), len(extra)))
-    label = connected_components(graph, directed=False)[1]
+    label = components(len(extra), np.stack([face[links], face[links + 1]], axis=1))
     order = np.argsort(label, kind="stable")
     walls = np.split(extra[order], np.flatnonzero(np.diff(label[order])) + 1)
     return sorted(walls, key=len)

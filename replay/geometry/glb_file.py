@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
 import struct
-from typing import Any
+
+from replay import limits
+from replay.geometry.glb_scene import Scene, read_scene
 
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
 """Extensions that change what a body looks like and not where it is."""
-_FAN = 6
-_LOOKS = ("images", "textures", "materials", "samplers", "skins", "animations", "cameras")
-"""Entries that say what a scene looks like, or how it moves."""
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_FLOAT, _WHOLE = 5126, (5121, 5123, 5125)
 
 
 def bare(data: bytes) -> bytes:
@@ -23,45 +23,25 @@ def bare(data: bytes) -> bytes:
     A picture of a few hundred kB can unfold to gigabytes, and what something looks like has no part in its shape.
 
     Raises:
-        ValueError: the file is cut or not glTF 2, or its geometry is kept in a way that would not be read.
+        ValueError: the file is cut or not glTF 2, its geometry is kept in a way that would not be read, or it holds
+            more than is read.
     """
     scene, binary = _chunks(data)
     size = len(binary)
+    _check_extensions(scene)
     try:
-        _check_extensions(scene)
         _check_buffers(scene, size)
         _check_geometry(scene)
-        _check_nodes(scene)
-        _strip(scene)
-    except KeyError as error:
-        raise ValueError(f"its description is not glTF 2: it lacks the entry {str(error.args[0])[:40]}") from None
-    except OverflowError:
-        raise ValueError("a number in its description is too large") from None
     except IndexError:
         raise ValueError("its description is not glTF 2: it refers to an entry that is not there") from None
-    except (TypeError, AttributeError):
-        raise ValueError("its description is not glTF 2: an entry is of another kind than it should be") from None
-    text = json.dumps(scene).encode()
+    _check_nodes(scene)
+    text = scene.text().encode()
     text += b" " * (-len(text) % 4)
     rest = struct.pack("<2I", size, _BINARY) + binary if size else b""
     return b"glTF" + struct.pack("<4I", 2, 20 + len(text) + len(rest), len(text), _JSON) + text + rest
 
 
-def _strip(scene: dict[str, Any]) -> None:
-    for name in _LOOKS:
-        scene.pop(name, None)
-    for mesh in scene.get("meshes", ()):
-        mesh.pop("name", None)
-        for primitive in mesh["primitives"]:
-            for name in ("material", "targets", "extensions"):
-                primitive.pop(name, None)
-            primitive["attributes"] = {"POSITION": primitive["attributes"]["POSITION"]}
-    for node in scene.get("nodes", ()):
-        for name in ("skin", "camera", "weights", "name", "extras"):
-            node.pop(name, None)
-
-
-def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+def _chunks(data: bytes) -> tuple[Scene, bytes]:
     """Return the description of the scene, and the binary data that come with it."""
     if data[:4] != b"glTF" or len(data) < 20:
         raise ValueError("it does not begin as one")
@@ -72,80 +52,97 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
         raise ValueError(f"its header announces {length} bytes; the file has {len(data)}")
     if kind != _JSON or 20 + size > len(data):
         raise ValueError("it does not begin with a whole description of its scene")
-    try:
-        scene = json.loads(data[20 : 20 + size])
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"the description of its scene is damaged: {error}") from None
-    if not isinstance(scene, dict):
-        raise ValueError("the description of its scene is damaged: it is no JSON object")
-    rest = data[20 + size :]
-    while len(rest) >= 8:
-        size, kind = struct.unpack("<2I", rest[:8])
-        if 8 + size > len(rest):
-            raise ValueError(f"a part of it announces {size} bytes; {len(rest) - 8} follow")
+    scene, at = read_scene(data[20 : 20 + size]), 20 + size
+    while len(data) - at >= 8:
+        size, kind = struct.unpack_from("<2I", data, at)
+        if at + 8 + size > len(data):
+            raise ValueError(f"a part of it announces {size} bytes; {len(data) - at - 8} follow")
         if kind == _BINARY:
-            return scene, rest[8 : 8 + size]
-        rest = rest[8 + size :]
+            return scene, data[at + 8 : at + 8 + size]
+        at += 8 + size
     return scene, b""
 
 
-def _check_extensions(scene: dict[str, Any]) -> None:
-    needed = [name for name in scene.get("extensionsRequired", ()) if not name.startswith(_HARMLESS)]
-    needed += [name for name in scene.get("extensionsUsed", ()) if name == "EXT_mesh_gpu_instancing"]
+def _check_extensions(scene: Scene) -> None:
+    needed = [name for name in scene.extensionsRequired if not name.startswith(_HARMLESS)]
+    needed += [name for name in scene.extensionsUsed if name == "EXT_mesh_gpu_instancing"]
     if needed:
-        raise ValueError(f"it needs the extension {needed[0]}, which is not read; export it without compression")
+        raise ValueError(f"it needs the extension {needed[0][:60]}, which is not read; export it without compression")
 
 
-def _check_buffers(scene: dict[str, Any], binary: int) -> None:
+def _check_buffers(scene: Scene, binary: int) -> None:
     """Check that all numbers are in the file: where they are not, trimesh fills in zeros, as many as announced."""
-    for buffer in scene.get("buffers", ()):
-        if not buffer.get("uri", "data:").startswith("data:"):
-            raise ValueError(f"its data are in another file, {buffer['uri'][:60]!r}; save it as one GLB file")
-    views = scene.get("bufferViews", [])
-    for number, view in enumerate(views):
-        inside = "uri" not in scene["buffers"][view["buffer"]]
-        if view["byteLength"] < 0 or (inside and view.get("byteOffset", 0) + view["byteLength"] > binary):
+    for buffer in scene.buffers:
+        if buffer.uri is not None and not buffer.uri.startswith("data:"):
+            raise ValueError(f"its data are in another file, {buffer.uri[:60]!r}; save it as one GLB file")
+    for number, view in enumerate(scene.bufferViews):
+        inside = scene.buffers[view.buffer].uri is None
+        if inside and view.byteOffset + view.byteLength > binary:
             raise ValueError(f"buffer view {number} is beyond the {binary} bytes of its data")
-    for number, accessor in enumerate(scene.get("accessors", ())):
-        kind, shape = accessor["componentType"], accessor["type"]
-        if kind not in _COMPONENT_BYTES or shape not in _COMPONENTS:
+    corners = 0
+    for number, accessor in enumerate(scene.accessors):
+        if accessor.componentType not in _COMPONENT_BYTES or accessor.type not in _COMPONENTS:
             raise ValueError(f"accessor {number} is of a type that glTF does not know")
-        row = _COMPONENT_BYTES[kind] * _COMPONENTS[shape]
-        if "bufferView" in accessor:
-            view = views[accessor["bufferView"]]
-            stride = view.get("byteStride", row)
-            room = view["byteLength"] - accessor.get("byteOffset", 0)
+        row = _COMPONENT_BYTES[accessor.componentType] * _COMPONENTS[accessor.type]
+        if accessor.bufferView is not None:
+            view = scene.bufferViews[accessor.bufferView]
+            stride = view.byteStride or row
+            room = view.byteLength - accessor.byteOffset
         else:
             stride, room = row, binary  # a sparse one, which the zeros of its full size are made for
-        if not 0 <= (accessor["count"] - 1) * stride + row <= room:
-            raise ValueError(f"accessor {number} announces {accessor['count']} entries, more than its data hold")
+        if (accessor.count - 1) * stride + row > room or stride < row:
+            raise ValueError(f"accessor {number} announces {accessor.count} entries, more than its data hold")
+        corners += accessor.count * _COMPONENTS[accessor.type]
+        if corners > 12 * limits.TRIANGLES:
+            raise ValueError(f"it holds more numbers than the {limits.TRIANGLES} triangles that are read have")
 
 
-def _check_geometry(scene: dict[str, Any]) -> None:
-    for mesh in scene.get("meshes", ()):
-        for primitive in mesh["primitives"]:
-            if primitive.get("mode") == _FAN:
+def _check_geometry(scene: Scene) -> None:
+    """Check that all triangles are read, and how many they are with every place that a body stands in."""
+    triangles = []
+    for mesh in scene.meshes:
+        found = 0
+        for part in mesh.primitives:
+            if part.mode == _FAN:
                 raise ValueError("it holds triangle fans, which are not read; save it as triangles")
-            used = [primitive["attributes"]["POSITION"], *([primitive["indices"]] if "indices" in primitive else [])]
-            for accessor in (scene["accessors"][index] for index in used):
-                if "sparse" in accessor or "bufferView" not in accessor:
+            corners = scene.accessors[part.attributes.POSITION]
+            index = None if part.indices is None else scene.accessors[part.indices]
+            for accessor in (corners, *(() if index is None else (index,))):
+                if accessor.sparse is not None or accessor.bufferView is None:
                     raise ValueError("it keeps corners in sparse or compressed form, which is not read")
+            if (corners.type, corners.componentType) != ("VEC3", _FLOAT):
+                raise ValueError("its corners are not three 32-bit numbers each, which alone are read")
+            if index is not None and (index.type != "SCALAR" or index.componentType not in _WHOLE):
+                raise ValueError("its triangles are not given by whole numbers")
+            count = (corners if index is None else index).count
+            found += max(count // 3 if part.mode == _TRIANGLES else count, corners.count // 3)
+        triangles.append(found)
+    placed = sum(triangles[node.mesh] for node in scene.nodes if node.mesh is not None)
+    if max(placed, sum(triangles)) > limits.TRIANGLES:
+        raise ValueError(f"it holds {max(placed, sum(triangles))} triangles; at most {limits.TRIANGLES} are read")
 
 
-def _check_nodes(scene: dict[str, Any]) -> None:
+def _check_nodes(scene: Scene) -> None:
     """Check that the nodes form trees of finite transforms: of a node with two parents only one place is read."""
-    nodes = scene.get("nodes", [])
+    nodes = scene.nodes
     parent: dict[int, int] = {}
     for number, node in enumerate(nodes):
-        values = [x for key in ("matrix", "translation", "rotation", "scale") for x in node.get(key, ())]
-        if not all(math.isfinite(x) for x in values):
+        if not all(math.isfinite(x) for x in node.numbers):
             raise ValueError(f"node {number} has a transform that is not finite")
-        for child in node.get("children", ()):
-            if child in parent or not 0 <= child < len(nodes):
+        for child in node.children or ():
+            if child in parent or child >= len(nodes):
                 raise ValueError(f"node {child} is not there, or has two parents")
             parent[child] = number
-    reached = [number for number in range(len(nodes)) if number not in parent]
-    for number in reached:
-        reached.extend(nodes[number].get("children", ()))
-    if len(reached) < len(nodes):
+    level = [number for number in range(len(nodes)) if number not in parent]
+    reached, depth = len(level), 1
+    while level := [child for number in level for child in nodes[number].children or ()]:
+        reached, depth = reached + len(level), depth + 1
+        if depth > limits.GLB_DEPTH:
+            raise ValueError(f"its nodes are more than {limits.GLB_DEPTH} deep within one another")
+    if reached < len(nodes):
         raise ValueError("a node is within itself")
+    for roots in scene.scenes or ():
+        if any(number >= len(nodes) for number in roots.nodes or ()):
+            raise ValueError("its description is not glTF 2: a scene begins with a node that is not there")
+    if scene.scene is not None and scene.scene >= len(scene.scenes or ()):
+        raise ValueError("its description is not glTF 2: its scene is not there")

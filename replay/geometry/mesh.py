@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from replay.errors import InvalidValue, MeshError, count
 from replay.geometry.closing import NO_CAPS, Openness, caps, openness
 from replay.geometry.copies import copies
+from replay.geometry.facets import ROUNDING, alike
 from replay.geometry.hull import extreme_points, to_unit_box
 from replay.geometry.mesh_file import read_faces
 from replay.geometry.outward import Turned, inside_out
 from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
-from replay.geometry.weld import weld
+from replay.geometry.weld import weld, weld_copies
 from replay.geometry.winding import Indices, Topology, corner_indices, topology
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
@@ -26,13 +27,6 @@ from replay.numerics.rows import distinct_rows
 Array = NDArray[np.float64]
 
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
-
-_FILE_ROUNDING = 2.0**-22
-"""Bodies are convex when no corner is further outside a face than this times the largest coordinate.
-
-STL and GLB keep 24 bits of a coordinate, so the corners of a convex shape leave their true place by 2^-25 of it each;
-three corners of a face and the one tested add up to less than this for all but slivers, which count as concave.
-"""
 
 
 def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> Solid:
@@ -98,7 +92,13 @@ def solid_from_triangles(triangles: Array) -> Solid:
         if welded:
             faces = taken_for[faces]
             triangles, before, joints = points[faces], joints, topology(faces)
-            notes.append(_on_welding(points, taken_for, before, joints))
+            notes.append(_on_welding(points, taken_for, f"which closed {_closed_edges(before, joints)}"))
+    known, taken_for = faces, weld_copies(points, faces, flat)
+    if (taken_for != np.arange(len(points))).any():
+        faces = taken_for[faces]
+        notes.append(_on_welding(points, taken_for, "so that triangles repeat"))
+    faces, source = alike(points, faces)
+    triangles, flat = points[faces], flat[source]
     again = copies(faces)
     repeats = int(np.count_nonzero(again & ~flat))
     if again.any():
@@ -106,6 +106,7 @@ def solid_from_triangles(triangles: Array) -> Solid:
             rule = "repeat another one, in either sense, and were dropped"
             notes.append(f"{repeats} of {len(triangles)} triangles {rule}")
         triangles, faces, flat = triangles[~again], faces[~again], flat[~again]
+    if faces is not known:
         joints = topology(faces)
     parts = find_parts(points, faces)
     if parts.turned.any():
@@ -131,12 +132,15 @@ def solid_from_triangles(triangles: Array) -> Solid:
     return Solid(triangles, pieces=pieces, watertight=watertight, closing=closing, dropped=dropped, notes=tuple(notes))
 
 
-def _on_welding(points: Array, taken_for: Indices, before: Topology, after: Topology) -> str:
+def _on_welding(points: Array, taken_for: Indices, effect: str) -> str:
     moved = points - points[taken_for]
     furthest = float(np.sqrt(np.max(np.sum(moved * moved, axis=1))))
     which = count(int(np.count_nonzero(taken_for != np.arange(len(points)))), "corner")
-    edges = count(_not_joined(before) - _not_joined(after), "edge")
-    return f"{which} at most {furthest:.2g} m from another one were taken for it, which closed {edges}"
+    return f"{which} at most {furthest:.2g} m from another one were taken for it, {effect}"
+
+
+def _closed_edges(before: Topology, after: Topology) -> str:
+    return count(_not_joined(before) - _not_joined(after), "edge")
 
 
 def _not_joined(joints: Topology) -> int:
@@ -181,9 +185,9 @@ def _convex_corners(triangles: Array) -> Array:
 
 
 def _is_convex(triangles: Array) -> bool:
-    """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane."""
+    """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane, within rounding."""
     local, _, scale = to_unit_box(triangles.reshape(-1, 3))
-    slack = _FILE_ROUNDING * float(np.max(np.abs(triangles))) / scale
+    slack = ROUNDING * float(np.max(np.abs(triangles))) / scale
     corners = _convex_corners(local.reshape(-1, 3, 3))
     return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -10,14 +11,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.errors import MeshError
 from replay.geometry import glb_file, obj_file, ply_file, stl_check
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 FORMATS: Final = (".stl", ".obj", ".ply", ".glb")
 """File endings that can be read; upper case too."""
 
+_HEAD = 1 << 16  # bytes among which a binary file has a zero
 _ADVICE = "; open it in a mesh editor and save it again as triangles"
-_POINTER = b"version https://git-lfs.github.com/spec/"
 _UTF_8, _UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 """How texts may begin."""
 
@@ -45,8 +48,12 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.
             raise MeshError(name, error.strerror or "cannot be read") from error
     if not data:
         raise MeshError(name, "is empty")
-    if data.startswith(_POINTER):
-        raise MeshError(name, "is a Git LFS pointer, not the mesh itself; fetch it with: git lfs pull")
+    if len(data) > limits.FILE:
+        raise MeshError(name, f"has {len(data)} bytes; at most {limits.FILE} are read")
+    if len(data) > limits.TEXT_MESH and b"\0" not in data[:_HEAD]:
+        raise MeshError(name, f"is text of {len(data)} bytes; at most {limits.TEXT_MESH} are read")
+    if is_lfs_pointer(data):
+        raise MeshError(name, LFS_POINTER)
     data = data.removeprefix(_UTF_8)
     if _is_utf_16(data):
         raise MeshError(name, "is UTF-16 text; save it as UTF-8")
@@ -82,6 +89,8 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
 
     if b"\0" not in data:  # text, whose names and comments may be in any encoding
         data = data.decode(errors="replace").encode()
+    log = logging.getLogger("trimesh")  # it tells of its attempts with tracebacks
+    told, log.disabled = log.disabled, True
     try:
         with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks of the mesh
             warnings.simplefilter("ignore")
@@ -91,3 +100,5 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
         if not reason or type(error).__module__ == "builtins":  # Python's words are none for people
             reason = "what it holds does not fit together"
         raise MeshError(name, f"is not a usable {kind.upper()} file: {reason[:200]}{_ADVICE}") from error
+    finally:
+        log.disabled = told

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from array import array
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.geometry.polygons import triangulate
 
 
@@ -21,8 +24,7 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """
     vertices, corners = array("d"), array("q")
     lengths = array("q")  # corners of each face
-    text = data.decode(errors="replace").replace("\r\n", "\n")  # comments and names may be in any encoding
-    for number, line in enumerate(text.replace("\\\n", " ").split("\n"), start=1):
+    for number, line in _lines(data):
         words = line.partition("#")[0].split()
         if not words or words[0] not in ("v", "f"):
             continue
@@ -30,12 +32,18 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
             if words[0] == "v":
                 x, y, z = map(float, words[1:4])
                 vertices.extend((x, y, z))
+                if len(vertices) > 3 * limits.TRIANGLES:
+                    raise _TooMany(f"it has more than the {limits.TRIANGLES} vertices that are read")
                 continue
             polygon = [_index(word, len(vertices) // 3) for word in words[1:]]
             if len(polygon) < 3:
                 raise ValueError("a face needs three corners")
             corners.extend(polygon)
             lengths.append(len(polygon))
+            if len(corners) - 2 * len(lengths) > limits.TRIANGLES:
+                raise _TooMany(f"it has more than the {limits.TRIANGLES} triangles that are read")
+        except _TooMany:
+            raise
         except (ValueError, OverflowError):
             what = "three numbers" if words[0] == "v" else "three or more vertices, counted from 1"
             raise ValueError(f"line {number}, {line.strip()[:60]!r}, does not name {what}") from None
@@ -43,6 +51,27 @@ def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if len(corners) and max(corners) >= len(points):
         raise ValueError(f"a face refers to vertex {max(corners) + 1}, and there are {len(points)}")
     return points, triangulate(points, corners, lengths)
+
+
+class _TooMany(ValueError):
+    """There are more vertices or faces than are read."""
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, str]]:
+    """Yield the lines with vertices and faces, and their numbers; one that ends in a backslash goes on below."""
+    begun = b""
+    number = 0
+    for raw in io.BytesIO(data):
+        line = raw.rstrip(b"\r\n")
+        number += not begun
+        if line.endswith(b"\\"):
+            begun += line[:-1] + b" "
+            if len(begun) > limits.OBJ_LINE:
+                raise ValueError(f"line {number} has more than {limits.OBJ_LINE} characters")
+            continue
+        whole, begun = begun + line, b""
+        if whole.lstrip()[:1] in (b"v", b"f"):
+            yield number, whole.decode(errors="replace")  # comments and names may be in any encoding
 
 
 def _index(word: str, before: int) -> int:

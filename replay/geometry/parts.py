@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, Sides, sides
+from replay.geometry.winding import Indices, Sides, components, sides
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -48,10 +48,10 @@ def find_parts(points: Array, faces: Indices) -> Parts:
     pairs = np.stack([found.face[at], found.face[at + 1], found.forward[at] == found.forward[at + 1]], axis=1)
     several = np.flatnonzero(found.number > 2)
     if len(several):
-        joined = _Joined(_components(len(faces), pairs))
+        joined = _Joined(components(len(faces), pairs))
         more = [link for edge in several.tolist() for link in _pair_up(points, faces, found, edge, joined)]
         pairs = np.concatenate([pairs, np.array(more, dtype=np.int64).reshape(-1, 3)])
-    label = _components(len(faces), pairs)
+    label = components(len(faces), pairs)
     turned, one_sided = _against(label, pairs)
     if turned.any():  # where several meet, neighbours are a guess: what is closed as it is wound stays
         turned &= ~_closed(faces, label, np.zeros_like(turned))[label]
@@ -77,14 +77,6 @@ class _Joined:
             self._joined_to[second] = first
 
 
-def _components(count: int, pairs: Indices) -> Indices:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
 def _against(label: Indices, pairs: Indices) -> tuple[Flags, Flags]:
     """Return which faces to turn over so that neighbours agree, the smaller number of each part; which are one-sided.
 
@@ -94,7 +86,7 @@ def _against(label: Indices, pairs: Indices) -> tuple[Flags, Flags]:
     count, (a, b, differ) = len(label), pairs.T
     if not differ.any():
         return np.zeros(count, dtype=np.bool_), np.zeros(int(label.max()) + 1, dtype=np.bool_)
-    twice = _components(
+    twice = components(
         2 * count,
         np.concatenate([np.stack([a, b + differ * count], axis=1), np.stack([a + count, b + (1 - differ) * count], 1)]),
     )

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.geometry.ply_numbers import Binary, Columns, Element, Lists, Property, Text, columns_of
 from replay.geometry.polygons import triangulate
 
@@ -28,6 +29,7 @@ _CORNERS: Final = ("vertex_index", "vertex_indices")
 """What files call the corners of a face."""
 
 _LONGEST_HEADER = 1 << 16
+_LONGEST_COUNT = 18  # digits
 
 
 def read(data: bytes) -> tuple[Floats, Indices]:
@@ -49,9 +51,16 @@ def read(data: bytes) -> tuple[Floats, Indices]:
         if len(body) < least:
             raise ValueError(f"its header announces {announced}: {least} bytes or more; {len(body)} bytes follow")
     else:
+        if body.count(b"\n") + body.count(b"\r") > 4 * limits.TRIANGLES:
+            raise ValueError(f"it has more than the {4 * limits.TRIANGLES} lines that are read")
         rows = sum(1 for line in body.splitlines() if line.strip())
         if rows < sum(element.count for element in elements):
             raise ValueError(f"its header announces {announced}, one a line; {rows} lines follow")
+    for element in elements:
+        if element.count > limits.TRIANGLES:
+            rule = f"its header announces {element.name[:60]} {element.count}"
+            raise ValueError(f"{rule}; at most {limits.TRIANGLES} of an element are read")
+    if not order:
         source = Text(body, announced)
     columns = [(element, columns_of(element, source)) for element in elements]
     points, triangles = np.zeros((0, 3)), [np.zeros((0, 3), np.int64)]
@@ -76,7 +85,7 @@ def _parse(head: str) -> tuple[str, list[Element]]:
         match line.split():
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
-            case ["element", name, count] if count.isdecimal():
+            case ["element", name, count] if count.isdecimal() and len(count) <= _LONGEST_COUNT:
                 elements.append(Element(name, int(count)))
             case ["property", "list", size, item, name] if elements and {size, item} <= _TYPES.keys():
                 length = np.dtype(order + _TYPES[size])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -34,12 +36,18 @@ class Element:
         return sum((entry.length or entry.item).itemsize for entry in self.properties)
 
 
+_WIDE = 1000  # entries of a row that are read as a table; beyond, rows are read one by one
+
+
 class Lists(NamedTuple):
     """A list in each of n rows: all values one after the other, and how many each row has (n,)."""
 
     values: Column
     lengths: NDArray[np.int64]
 
+
+_MOST = 1 << 31
+_SPACE = re.compile(rb"\s")
 
 Columns = dict[str, Column | Lists]
 
@@ -56,13 +64,16 @@ class Source(Protocol):
             ValueError: there are fewer.
         """
 
+    def run(self, kind: Kind, count: int) -> Column:
+        """Return the next numbers, (count,), all of one kind; ValueError when there are fewer."""
+
 
 class Text:
     """Numbers written as words."""
 
     def __init__(self, body: bytes, announced: str) -> None:
         try:
-            self._numbers = np.array(body.split(), dtype=np.float64)
+            self._numbers = np.concatenate([np.array(part.split(), dtype=np.float64) for part in _parts(body)])
         except ValueError:
             raise ValueError("its text holds words that are not numbers") from None
         self._announced = announced
@@ -76,6 +87,24 @@ class Text:
         table = self._numbers[self.at : end].reshape(count, len(kinds))
         self.at = end
         return list(table.T)
+
+    def run(self, kind: Kind, count: int) -> Column:
+        """See `Source`."""
+        end = self.at + count
+        if end > len(self._numbers):
+            raise ValueError(f"its header announces {self._announced}; its numbers end before")
+        values = self._numbers[self.at : end]
+        self.at = end
+        return values
+
+
+def _parts(text: bytes) -> Iterator[bytes]:
+    """Yield a text in parts of about a megabyte, cut between words, so that few words are in memory at once."""
+    begin = 0
+    while begin <= len(text):
+        end = _SPACE.search(text, begin + (1 << 20))
+        yield text[begin : end.start() if end else len(text)]
+        begin = end.start() + 1 if end else len(text) + 1
 
 
 class Binary:
@@ -93,6 +122,14 @@ class Binary:
         table = np.frombuffer(self._body, row, count, self.at)
         self.at += row.itemsize * count
         return [table[name] for name in row.names or ()]
+
+    def run(self, kind: Kind, count: int) -> Column:
+        """See `Source`."""
+        if self.at + kind.itemsize * count > len(self._body):
+            raise ValueError(f"its header announces {self._announced}; the file ends before")
+        values = np.frombuffer(self._body, kind, count, self.at)
+        self.at += kind.itemsize * count
+        return values
 
 
 def columns_of(element: Element, source: Source) -> Columns:
@@ -116,7 +153,7 @@ def columns_of(element: Element, source: Source) -> Columns:
     rows = [_row(element, source) for _ in range(element.count)]
     result: Columns = {}
     for k, entry in enumerate(element.properties):
-        values = np.concatenate([row[k] for row in rows])
+        values = np.concatenate([row[k] for row in rows]).astype(entry.item, copy=False)
         result[entry.name] = values if entry.length is None else Lists(values, np.array([len(row[k]) for row in rows]))
     return result
 
@@ -125,15 +162,17 @@ def _row(element: Element, source: Source) -> list[Column]:
     """Return the values of one row's properties."""
     found = []
     for entry in element.properties:
-        length = 1 if entry.length is None else int(source.rows([entry.length], 1)[0][0])
-        if length < 0:
+        length = 1 if entry.length is None else source.run(entry.length, 1)[0]
+        if not 0 <= length < _MOST:
             raise ValueError(f"a list of its element {element.name} announces {length} entries")
-        found.append(np.array([column[0] for column in source.rows([entry.item] * length, 1)], dtype=entry.item))
+        found.append(source.run(entry.item, int(length)))
     return found
 
 
 def _alike(element: Element, source: Source, lengths: list[int]) -> Columns:
     """Return the columns of rows whose lists all have these lengths; ValueError where one has not."""
+    if sum(lengths) > _WIDE:
+        raise ValueError("its rows are too long to be read as a table")
     kinds: list[Kind] = []
     for entry, length in zip(element.properties, lengths, strict=True):
         kinds += ([] if entry.length is None else [entry.length]) + [entry.item] * length

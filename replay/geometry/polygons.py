@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.numerics.rows import distinct_rows
 
 Floats = NDArray[np.float64]
@@ -22,9 +23,16 @@ def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Seque
         points: (p, 3).
         corners: (c,) the corners of all polygons, one after the other; none is checked.
         lengths: (n,) how many of them each polygon has, at least three.
+
+    Raises:
+        ValueError: there are more triangles or corners than are read.
     """
     corners, lengths = np.asarray(corners, dtype=np.int64), np.asarray(lengths, dtype=np.int64)
+    if len(lengths) and lengths.max() > limits.POLYGON:
+        raise ValueError(f"it has a polygon of {lengths.max()} corners; at most {limits.POLYGON} are read")
     sizes = lengths - 2
+    if sizes.sum() > limits.TRIANGLES:
+        raise ValueError(f"it has {sizes.sum()} triangles; at most {limits.TRIANGLES} are read")
     start = np.cumsum(lengths) - lengths
     first = np.repeat(start, sizes)
     step = np.arange(len(first)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
@@ -36,6 +44,9 @@ def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Seque
     again = _again(place[corners], start, lengths)
     if len(folded) == 0 and len(again) == 0:
         return fans
+    if len(folded) + len(again) > limits.FOLDED_POLYGONS:
+        rule = f"it has {len(folded) + len(again)} polygons that are not convex or are there twice"
+        raise ValueError(f"{rule}; at most {limits.FOLDED_POLYGONS} are split: save it as triangles")
     several = np.split(fans, np.cumsum(sizes)[:-1])
     polygons = np.split(corners, start[1:])
     for polygon in folded.tolist():
@@ -113,10 +124,14 @@ def _with_all_corners(triangles: Indices, count: int) -> Indices:
 
     Without those corners the edge would not be that of the neighbouring polygons.
     """
+    if len(triangles) >= count - 2:
+        return triangles
     walked = {(int(a), int(b)) for face in triangles for a, b in zip(face, np.roll(face, -1), strict=True)}
     more = []
     for a, b in sorted(walked):
         if (b, a) not in walked:
             between = [(a + k) % count for k in range((b - a) % count)]
             more += [(c, (c + 1) % count, b) for c in between[:-1]]
+            if len(more) > 2 * count:
+                raise ValueError(f"a polygon of {count} corners crosses itself and cannot be split into triangles")
     return np.concatenate([triangles, np.array(more, dtype=np.int64).reshape(-1, 3)])

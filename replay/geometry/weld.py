@@ -7,7 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, sides
+from replay.geometry.copies import copies
+from replay.geometry.facets import alike
+from replay.geometry.winding import Indices, components, sides
 
 Array = NDArray[np.float64]
 
@@ -63,17 +65,8 @@ def _welded(
 ) -> Indices:
     """Return `taken_for` with those groups of near corners that may become one and close an edge by it."""
     now = taken_for[faces]
-    group = _groups(len(points), pairs)
-    size = np.bincount(group)
-    allowed = size > 1
-    low, high = np.full((len(size), 3), np.inf), np.full((len(size), 3), -np.inf)
-    np.minimum.at(low, group, points)
-    np.maximum.at(high, group, points)
-    allowed &= np.max(high - low, axis=1) <= reach
-    # a triangle of some area must not lose it
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        same = (group[now[:, a]] == group[now[:, b]]) & (now[:, a] != now[:, b]) & ~flat
-        allowed[group[now[same, a]]] = False
+    group = components(len(points), pairs)
+    allowed = _small(points, group, reach, now[~flat])
     used = np.bincount(now.ravel(), minlength=len(points))
     while True:
         trial = _merged(group, allowed, used)[taken_for]
@@ -93,13 +86,40 @@ def _welded(
         allowed &= useful
 
 
-def _groups(count: int, pairs: Indices) -> Indices:
-    """Return the number of the group (count,) of each corner, near ones in one."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def weld_copies(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indices:
+    """Return the corner that each corner (p,) is taken for, itself for most: triangles are seen to be copies then.
 
-    graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    Corners become one if the rounding of doubles has parted them, no triangle that has an area loses it, and there are
+    more copies among the triangles then (see `copies`). Arguments as of `weld`.
+    """
+    from scipy.spatial import cKDTree
+
+    itself, used = np.arange(len(points)), np.unique(faces)
+    reach = _ROUNDING * float(np.max(np.ptp(points, axis=0)))
+    pairs = used[cKDTree(points[used]).query_pairs(reach, output_type="ndarray")]
+    if len(pairs) == 0:
+        return itself
+    group = components(len(points), pairs)
+    allowed = _small(points, group, reach, faces[~flat])
+    trial = _merged(group, allowed, np.bincount(faces.ravel(), minlength=len(points)))
+    return trial if _copies(points, trial[faces]) > _copies(points, faces) else itself
+
+
+def _copies(points: Array, faces: Indices) -> int:
+    return int(np.count_nonzero(copies(alike(points, faces).faces)))
+
+
+def _small(points: Array, group: Indices, reach: float, faces: Indices) -> NDArray[np.bool_]:
+    """Return which groups of several corners are no larger than `reach`, and hold no two of one face."""
+    size = np.bincount(group)
+    low, high = np.full((len(size), 3), np.inf), np.full((len(size), 3), -np.inf)
+    np.minimum.at(low, group, points)
+    np.maximum.at(high, group, points)
+    allowed = (size > 1) & (np.max(high - low, axis=1) <= reach)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        same = (group[faces[:, a]] == group[faces[:, b]]) & (faces[:, a] != faces[:, b])
+        allowed[group[faces[same, a]]] = False
+    return np.asarray(allowed)
 
 
 def _merged(group: Indices, allowed: NDArray[np.bool_], used: Indices) -> Indices:

@@ -96,3 +96,12 @@ def topology(faces: Indices) -> Topology:
     odd = count % 2 == 1
     turned = ~odd & (found.balance != 0)
     return Topology(*(int(np.count_nonzero(kind)) for kind in (count == 1, odd & (count > 1), turned)))
+
+
+def components(count: int, pairs: Indices) -> Indices:
+    """Return which component (count,) each of `count` things is in, where pairs (k, 2) are joined."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import bz2
 import contextlib
+import functools
 import io
 import json
 import sqlite3
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.message_log import Message, MessageLog
@@ -26,10 +29,20 @@ def ros2_bag(name: str, data: bytes) -> MessageLog:
 
 
 def _ros1_bag(data: bytes) -> MessageLog:
+    import lz4.frame  # type: ignore[import-untyped]
     from rosbags.rosbag1 import Reader
+    from rosbags.rosbag1.reader import decompressors
+
+    unpackers = {"bz2": bz2.BZ2Decompressor, "lz4": lz4.frame.LZ4FrameDecompressor}
+    kinds = {decompressors[name]: unpacker for name, unpacker in unpackers.items()}
 
     reader = Reader(_InMemory(data))  # type: ignore[arg-type]
     reader.open()
+    unpack = _Unpacker(len(data))
+    for place, chunk in reader.chunks.items():
+        kind = kinds.get(chunk.decompressor)
+        if kind is not None:
+            reader.chunks[place] = chunk._replace(decompressor=functools.partial(unpack, kind))
     channels, schemas = {}, {}
     for connection in reader.connections:
         name = connection.msgtype.replace("/msg/", "/")
@@ -46,17 +59,25 @@ def _ros1_bag(data: bytes) -> MessageLog:
 
 def _ros2_bag(data: bytes) -> MessageLog:
     definitions: dict[str, tuple[str, str]] = {}
-    channels, schemas = {}, {}
+    channels: dict[int, Channel] = {}
+    schemas: dict[int, Schema] = {}
     with _database(data) as database:
         if database.execute("PRAGMA quick_check(1)").fetchone() != ("ok",):
             raise sqlite3.DatabaseError("its pages contradict one another")
-        tables = {row[0] for row in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-        if "message_definitions" in tables:
+        kinds = dict(database.execute("SELECT name, type || ':' || ifnull(rootpage, 0) FROM sqlite_master"))
+        if any(not kind.startswith(("table:", "index:")) or kind == "table:0" for kind in kinds.values()):
+            raise sqlite3.DatabaseError("it holds more than tables")
+        for table in ("topics", "messages", "message_definitions"):
+            if any(row[6] for row in database.execute(f"PRAGMA table_xinfo({table})")):
+                raise sqlite3.DatabaseError(f"its table {table} is computed")
+        if "message_definitions" in kinds:
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-            definitions = {row[0]: row[1:] for row in database.execute(query)}
-        for number, topic, kind, encoding in database.execute(
-            "SELECT id, name, type, serialization_format FROM topics"
+            definitions = {row[0]: row[1:] for row in _rows(database, query, str, str, str)}
+        for number, topic, kind, encoding in _rows(
+            database, "SELECT id, name, type, serialization_format FROM topics", int, str, str, str
         ):
+            if len(channels) >= limits.CHANNELS:
+                raise ValueError(f"it has more than {limits.CHANNELS} topics")
             language, text = definitions.get(kind, ("ros2msg", ""))
             schemas[number] = Schema(long_name(kind), language, text.encode())
             channels[number] = Channel(number, number, topic, encoding, {})
@@ -64,10 +85,19 @@ def _ros2_bag(data: bytes) -> MessageLog:
     def messages(wanted: Collection[int]) -> Iterator[Message]:
         query = "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN (SELECT value FROM json_each(?))"
         with _database(data) as database:
-            for channel, time, message in database.execute(f"{query} ORDER BY timestamp, id", [json.dumps([*wanted])]):
+            ordered = f"{query} ORDER BY timestamp, id"
+            for channel, time, message in _rows(database, ordered, int, int, bytes, values=[json.dumps([*wanted])]):
                 yield Message(channel, time, message)
 
     return MessageLog(channels, schemas, messages)
+
+
+def _rows(database: sqlite3.Connection, query: str, *kinds: type, values: Sequence[Any] = ()) -> Iterator[Any]:
+    """Yield the rows of a query; ValueError where one has values of other types, which SQLite lets into any column."""
+    for row in database.execute(query, values):
+        if not all(isinstance(value, kind) for value, kind in zip(row, kinds, strict=True)):
+            raise ValueError("a row of it holds values of other types than a bag has")
+        yield row
 
 
 @contextlib.contextmanager
@@ -76,6 +106,9 @@ def _database(data: bytes) -> Iterator[sqlite3.Connection]:
         if data[18:20] == b"\2\2":  # written ahead into a second file, which there is none of in memory
             data = data[:18] + b"\1\1" + data[20:]
         database.deserialize(data)
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, limits.CHUNK)
+        steps = iter(range(limits.database_steps(len(data)) // _STEPS))
+        database.set_progress_handler(lambda: next(steps, None) is None, _STEPS)
         yield database
 
 
@@ -99,6 +132,23 @@ def _told(error: Exception) -> str:
     return str(error).partition("\n")[0].rstrip(".") or type(error).__name__
 
 
+_STEPS = 10_000  # of SQLite's machine between two looks at how many there were
+
+
+class _Unpacker:
+    """Unpacks the chunks of a bag up to the bytes that are read of a bag of its size."""
+
+    def __init__(self, size: int) -> None:
+        self._left = self._most = limits.unpacked(size)
+
+    def __call__(self, kind: Callable[[], Any], data: bytes) -> bytes:
+        found: bytes = kind().decompress(data, max_length=self._left + 1)
+        self._left -= len(found)
+        if self._left < 0:
+            raise ValueError(f"it unpacks to more than the {self._most} bytes that are read of a bag of its size")
+        return found
+
+
 class _InMemory:
     """Bytes as a path that `rosbags` opens."""
 
@@ -109,4 +159,19 @@ class _InMemory:
         return True
 
     def open(self, *_: Any, **__: Any) -> io.BytesIO:
-        return io.BytesIO(self._data)
+        return _Counted(self._data)
+
+
+class _Counted(io.BytesIO):
+    """A file that is not read again and again, as an index asks for that names one place a thousand times."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        self._left = limits.reads(len(data))
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        self._left -= len(data) + 1
+        if self._left < 0:
+            raise ValueError("it asks for the same bytes again and again")
+        return data

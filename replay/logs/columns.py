@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
-from replay.errors import RecordingError
+from replay import limits
+from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_chunks import Run
 from replay.logs.mcap_reader import McapLog
 from replay.logs.protobuf import message_type
@@ -46,8 +46,9 @@ def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str
         RecordingError: damage, a topic that is not protobuf, a message that its schema does not describe, or a
             number of messages other than the statistics say.
     """
+    room = _Room(log)
     wanted = {
-        channel.id: _Reader(log, channel.id)
+        channel.id: _Reader(log, channel.id, room)
         for channel in sorted(log.channels.values(), key=lambda channel: channel.topic)
         if topics is None or channel.topic in topics
     }
@@ -72,11 +73,37 @@ def _pass(log: McapLog, wanted: Mapping[int, _Reader]) -> None:
                 wanted[run.channel].add(run)
 
 
+class _Room:
+    """The bytes that the columns of a log may take together, and the fields that may be taken out of its chunks."""
+
+    def __init__(self, log: McapLog) -> None:
+        self._log = log
+        self._bytes = 0
+        self._fields = 0
+
+    def take(self, size: int) -> None:
+        """Count bytes, or give them back; LimitError when all together are too many."""
+        self._bytes += size
+        most = limits.columns(self._log.size)
+        if self._bytes > most:
+            rule = f"holds more than {most} bytes of values, the most that are read of a file of its size"
+            raise LimitError(str(self._log.path), rule)
+
+    def visit(self, fields: int) -> None:
+        """Count the fields that are taken out of a chunk; LimitError when all together are too many."""
+        self._fields += fields
+        most = limits.visits(self._log.size)
+        if self._fields > most:
+            rule = f"holds messages of so many fields that more than {most} would be taken out of its chunks"
+            raise LimitError(str(self._log.path), rule)
+
+
 class _Reader:
     """Collects the runs of one channel: as columns, until one does not fit; then everything again as messages."""
 
-    def __init__(self, log: McapLog, channel: int) -> None:
+    def __init__(self, log: McapLog, channel: int, room: _Room) -> None:
         self.regular = True
+        self._room_left = room
         self._log = log
         self._channel = log.channels[channel]
         self.name = self._channel.topic
@@ -92,6 +119,8 @@ class _Reader:
 
     def restart(self) -> None:
         """Forget what was read, and decode message by message from now on."""
+        self._room_left.take(-sum(column.nbytes for column in getattr(self, "_columns", {}).values()))
+        self._decoded = 0
         self._times: list[NDArray[np.int64]] = []
         self._shape: MessageShape | None = None
         self._columns: dict[str, NDArray[Any]] = {}
@@ -103,6 +132,11 @@ class _Reader:
         """Take the next run."""
         if self._decoding:
             self._times.append(run.time)
+            self._decoded += sum(map(len, run.payloads)) if run.rows is None else run.rows.size
+            if self._decoded > limits.irregular(self._log.size):
+                most = limits.irregular(self._log.size)
+                rule = f"topic {self.name!r} holds more than {most} bytes in messages without a common layout"
+                raise LimitError(self._file, rule)
             self._messages.extend(self._decode(data) for data in run.messages())
         elif self.regular:
             self._times.append(run.time)
@@ -133,6 +167,7 @@ class _Reader:
         if self._shape is None or not self._shape.fits(run.rows):
             return False
         begin, end = self._count, self._count + len(run.rows)
+        self._room_left.visit(len(self._shape.slots))
         for path, slot in self._shape.slots.items():
             values = slot.read(run.rows)
             self._room(path, values, end)[begin:end] = values
@@ -144,6 +179,7 @@ class _Reader:
         column = self._columns.get(path)
         if column is None or len(column) < end:
             rows = max(end, min(self._expected, 8 * end) if self._expected else 2 * end)
+            self._room_left.take((rows - len(column if column is not None else ())) * values[:1].nbytes)
             grown = np.empty((rows, *values.shape[1:]), dtype=values.dtype)
             if column is not None:
                 grown[: len(column)] = column
@@ -157,26 +193,3 @@ class _Reader:
             raise RecordingError(
                 self._file, f"topic {self.name!r} holds a message that its schema cannot read: {error}"
             ) from None
-
-
-def flatten(message: Message) -> dict[str, Any]:
-    """Return a message's values by field path; singular fields that are not set have their default, repeated none."""
-    result: dict[str, Any] = {}
-    _flatten(message, "", result)
-    return result
-
-
-def _flatten(message: Message, prefix: str, result: dict[str, Any]) -> None:
-    for field in message.DESCRIPTOR.fields:
-        value = getattr(message, field.name)
-        path = prefix + field.name
-        if field.type == FieldDescriptor.TYPE_MESSAGE:
-            if field.is_repeated:
-                for index, item in enumerate(value):
-                    _flatten(item, f"{path}[{index}].", result)
-            elif message.HasField(field.name):
-                _flatten(value, f"{path}.", result)
-        elif field.is_repeated:
-            result[path] = list(value)
-        else:
-            result[path] = value

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.excerpt import EXCERPT
 
@@ -50,12 +51,16 @@ class Table:
         headings: by column; "" for none.
         time: heading of the times.
         lines: number of the line of each row.
-        rows: cells, as many as headings.
+        columns: the cells of all rows, by column.
         origin: the note on the file that this is a part of, else empty.
     """
 
     def __init__(self, name: str, data: bytes, format: Format) -> None:
         """Read a file; RecordingError as of `read_csv`."""
+        if len(data) > limits.TEXT_LOG:
+            raise RecordingError(name, f"has {len(data)} bytes; at most {limits.TEXT_LOG} of a CSV are read")
+        if data.count(b"\n") + data.count(b"\r") > limits.CELLS:
+            raise RecordingError(name, f"has more than {limits.CELLS} lines")
         text = _text(name, data)
         self._name = name
         self._format = format
@@ -79,21 +84,36 @@ class Table:
         self.separator, self.headings, self.time = chosen
         named = [heading for heading in self.headings if heading]
         if len(set(named)) != len(named):
-            raise RecordingError(name, f"has a heading twice; its columns are {named}")
+            raise RecordingError(name, f"has a heading twice; its columns are {_some(named)}")
+        if len(lines) * len(self.headings) > limits.CELLS:
+            rule = f"has {len(lines)} lines of {len(self.headings)} columns; at most {limits.CELLS} cells are read"
+            raise RecordingError(name, rule)
         self.lines: list[int] = []
-        self.rows: list[list[str]] = []
+        rows = []
         for line, cells in self._cells(lines):
             self.lines.append(line)
-            self.rows.append(self._fitted(line, cells))
+            rows.append(cells if len(cells) == len(self.headings) else self._fitted(line, cells))
+        columns = zip(*rows, strict=True) if rows else ((),) * len(self.headings)
+        self.columns = [tuple(map(str.strip, column)) for column in columns]
 
     def _headings(self, line: str, candidates: Sequence[str]) -> tuple[str, list[str], str] | None:
         """Return separator, headings and the heading of the times, where there is such a one."""
         for separator in candidates:
-            headings = [heading.strip() for heading in next(csv.reader([line], delimiter=separator), [])]
+            headings = [heading.strip() for heading in self._split(line, separator)]
+            while headings and not headings[-1]:  # columns without a heading are passed over
+                del headings[-1]
+            if len(headings) > limits.COLUMNS:
+                raise RecordingError(self._name, f"has {len(headings)} columns; at most {limits.COLUMNS} are read")
             time = self._time_among(headings)
             if time is not None:
                 return separator, headings, time
         return None
+
+    def _split(self, line: str, separator: str) -> list[str]:
+        try:
+            return next(csv.reader([line], delimiter=separator), [])
+        except csv.Error as error:
+            raise RecordingError(self._name, f"cannot be read as CSV: {error}") from None
 
     def _time_among(self, headings: Sequence[str]) -> str | None:
         wanted = self._format.time or "time"
@@ -103,10 +123,10 @@ class Table:
         return units[0] if self._format.time is None and len(units) == 1 else None
 
     def _without_time(self, line: str, candidates: Sequence[str]) -> str:
-        by_separator = {s: next(csv.reader([line], delimiter=s), []) for s in candidates}
+        by_separator = {s: self._split(line, s) for s in candidates}
         separator = max(candidates, key=lambda s: len(by_separator[s]))
         headings = [heading.strip() for heading in by_separator[separator]]
-        rule = f"has no column {self._format.time or 'time'!r}; its columns are {headings}"
+        rule = f"has no column {self._format.time or 'time'!r}; its columns are {_some(headings)}"
         other = [s for s in SEPARATORS if s in line and s not in candidates]
         if len(headings) == 1 and other:
             return f"{rule}; its cells seem to be separated by {SEPARATORS[other[0]]}: state separator"
@@ -117,32 +137,31 @@ class Table:
         return f"{rule}; name the one with the times in time.column"
 
     def _cells(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-        numbers: list[int] = []
-
-        def counted() -> Iterator[str]:
-            for index in range(self.begin, len(lines)):
-                if not lines[index].lstrip().startswith(_COMMENT):
-                    numbers.append(index + 1)
-                    yield lines[index]
-
-        reader = csv.reader(counted(), delimiter=self.separator, strict=True)
+        numbers = [k for k in range(self.begin, len(lines)) if not lines[k].lstrip().startswith(_COMMENT)]
+        reader = csv.reader((lines[k] for k in numbers), delimiter=self.separator, strict=True)
         try:
             for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    yield numbers[-1], cells
+                if any(map(str.strip, cells)):
+                    yield numbers[reader.line_num - 1] + 1, cells
         except csv.Error as error:
             raise RecordingError(self._name, f"cannot be read as CSV: {error}") from None
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """Return a line's cells, as many as headings: what is missing or more than those must be empty."""
         count = len(self.headings)
-        row = [cell.strip() for cell in cells[:count]] + [""] * (count - len(cells))
+        row = cells[:count] + [""] * (count - len(cells))
         if any(cell.strip() for cell in cells[count:]) or any(self.headings[len(cells) :]):
             rule = f"line {line} has {len(cells)} cells, its headings are {count}"
             if self.separator == "," and len(cells) > count and all(_digits(cell) for cell in cells):
                 rule += "; if its numbers have decimal commas, separate the cells by semicolons"
             raise RecordingError(self._name, rule)
         return row
+
+
+def _some(headings: Sequence[str]) -> str:
+    """Return headings for a message, the first of many."""
+    shown = ", ".join(repr(heading[:60]) for heading in headings[:20])
+    return f"[{shown}{', ...' if len(headings) > 20 else ''}]"
 
 
 def _text(name: str, data: bytes) -> str:

@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.errors import CurveError
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 Floats = NDArray[np.float64]
 
@@ -112,6 +113,8 @@ def read_curve(
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     """Return the cells of every line that is not a remark, with the line's number, up to the last one with content."""
     try:
+        if path.stat().st_size > limits.TEXT_LOG:
+            raise CurveError(str(path), None, f"has more than {limits.TEXT_LOG} bytes")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise CurveError(str(path), None, f"cannot be read: {error.strerror or error}") from None

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from replay.errors import RecordingError
 from replay.logs.csv_table import Format, Table, unit_of
@@ -84,35 +85,38 @@ class _Log:
 
     def _series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column; None without any, or if it holds something else and is not needed."""
-        values, rows = [], []
-        for index in range(self._skip, len(self._times)):
-            cell = self._table.rows[index][column]
-            if not cell:
-                continue
-            value = _value(cell.replace(",", ".") if self._decimal == "," else cell)
-            if value is None:
-                if heading in self._needed:
-                    raise RecordingError(self._name, self._no_number(index, heading, cell))
-                return None
-            values.append(value)
-            rows.append(index)
-        if not rows:
+        cells = self._table.columns[column]
+        row = np.array([k for k in range(self._skip, len(cells)) if cells[k]], dtype=np.int64)
+        values = _values([cells[k] for k in row.tolist()], self._decimal)
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if len(wrong) and heading in self._needed:
+            index = int(row[wrong[0]])
+            raise RecordingError(self._name, self._no_number(index, heading, cells[index]))
+        if len(wrong) or not len(row):
             return None
-        row = np.array(rows, dtype=np.int64)
-        time, position = np.array(self._times, dtype=np.int64)[row], np.array(values, dtype=np.float64) + 0.0
-        first = unrepeated(time, position)
-        return Series(time[first], position[first], row[first])
+        time = np.array(self._times, dtype=np.int64)[row]
+        first = unrepeated(time, values)
+        return Series(time[first], values[first], row[first])
 
     def _found_decimal(self) -> str:
         """Return the sign between whole and decimal digits: a comma where numbers have one and none has a point."""
-        columns = [k for k, h in enumerate(self._table.headings) if h in self._needed or k == self._at]
-        cells = [(line, row[k]) for line, row in zip(self._table.lines, self._table.rows, strict=True) for k in columns]
-        comma = next((line for line, cell in cells if _WITH_COMMA.fullmatch(cell)), None)
-        point = next((line for line, cell in cells if _WITH_POINT.fullmatch(cell)), None)
-        if comma is not None and point is not None:
+        read = {*self._needed, self._table.time}
+        columns = [c for h, c in zip(self._table.headings, self._table.columns, strict=True) if h in read]
+        comma = self._first_line(columns, ",", _WITH_COMMA)
+        if comma is None:
+            return "."
+        point = self._first_line(columns, ".", _WITH_POINT)
+        if point is not None:
             rule = f"has a decimal point in line {point} and a decimal comma in line {comma}; write one of the two"
             raise RecordingError(self._name, rule)
-        return "." if comma is None else ","
+        return ","
+
+    def _first_line(self, columns: Sequence[Sequence[str]], sign: str, form: re.Pattern[str]) -> int | None:
+        """Return the first line with a cell of a form, which has a sign in it."""
+        if not any(sign in cell for column in columns for cell in column):
+            return None
+        rows = zip(self._table.lines, *columns, strict=True)
+        return next((line for line, *cells in rows if any(map(form.fullmatch, cells))), None)
 
     def _time_unit(self) -> Fraction:
         unit = self._format.unit or unit_of(self._table.time)[1]
@@ -120,8 +124,7 @@ class _Log:
 
     def _read_times(self) -> list[int]:
         times, zones = [], set()
-        for index, row in enumerate(self._table.rows):
-            cell = row[self._at]
+        for index, cell in enumerate(self._table.columns[self._at]):
             try:
                 time = nanoseconds(cell.replace(",", ".") if self._decimal == "," else cell, self._unit)
                 kind = ""
@@ -167,7 +170,7 @@ class _Log:
         out.write(f"# {EXCERPT} of {origin.get('name', '')}, sha256 {origin.get('sha256', '')}\n")
         writer = csv.writer(out, delimiter=self._table.separator, lineterminator="\n")
         writer.writerow([self._table.headings[k] for k in columns])
-        writer.writerows([[self._table.rows[index][k] for k in columns] for index in rows])
+        writer.writerows([[self._table.columns[k][index] for k in columns] for index in rows])
         return out.getvalue().encode()
 
 
@@ -176,9 +179,20 @@ def _joint(heading: str) -> str:
     return unit_of(heading)[0].removesuffix(" position")
 
 
-def _value(cell: str) -> float | None:
+def _values(cells: Sequence[str], decimal: str) -> NDArray[np.float64]:
+    """Return the numbers in cells, NaN for what is none or not finite."""
+    if decimal == ",":
+        cells = [cell.replace(",", ".") for cell in cells]
     try:
-        value = math.nan if "_" in cell else float(cell)  # 1_000 is a number to Python only
+        if not any("_" in cell for cell in cells):
+            return np.array(list(map(float, cells)), dtype=np.float64) + 0.0
     except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+        pass
+    return np.array([_value(cell) for cell in cells], dtype=np.float64)
+
+
+def _value(cell: str) -> float:
+    try:
+        return math.nan if "_" in cell else float(cell)  # 1_000 is a number to Python only
+    except ValueError:
+        return math.nan

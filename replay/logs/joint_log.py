@@ -272,6 +272,8 @@ def _joined(by_publisher: Mapping[Publisher, Sequence[Series]]) -> Series:
 
 def unrepeated(time: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which samples (n,) are not there before: at the same time with the same value (n,) or (n, k)."""
+    if (time[1:] > time[:-1]).all():
+        return np.ones(len(time), dtype=np.bool_)
     bits = np.column_stack([time, value.reshape(len(time), -1).view(np.int64)])
     rows = np.ascontiguousarray(bits).view(np.dtype((np.void, bits.dtype.itemsize * bits.shape[1])))[:, 0]
     result = np.zeros(len(time), dtype=np.bool_)

@@ -8,7 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from replay import limits
 from replay.errors import RecordingError
+from replay.json_text import read_json
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.protobuf import message_type
 from replay.logs.ros_messages import ros_decoder
@@ -88,6 +90,8 @@ def decoder(name: str, channel: Channel, schema: Schema | None) -> Decoder:
 
     def checked(message: bytes) -> list[Sample]:
         try:
+            if len(message) > limits.MESSAGE:
+                raise ValueError(f"it has {len(message)} bytes; at most {limits.MESSAGE} are taken apart")
             return decode(message)
         except Exception as error:  # each format's library fails in ways of its own on bytes that are not its messages
             reason = str(error).partition("\n")[0] or type(error).__name__
@@ -166,7 +170,7 @@ def _transform_stamped(message: Mapping[str, Any]) -> Sample:
 
 def _json(data: bytes, whole: str) -> list[Sample]:
     """Return the samples of a message; `whole` is the list that its type has, which may be left out when empty."""
-    message = _object(json.loads(data), "it")
+    message = _object(read_json(data, most=limits.MESSAGE), "it")
     message = {whole: [], **message} if whole else message
     if "transforms" in message:
         return [_json_transform(_object(item, "a transform")) for item in message["transforms"]]

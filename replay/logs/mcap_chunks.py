@@ -12,8 +12,9 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from replay.errors import RecordingError
+from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
+from replay.logs.work import Work
 
 MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
 """Bytes of a message record before its data."""
@@ -57,7 +58,7 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
                 reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
                 data = reader.read(size + 1)
         elif chunk.compression == "lz4":
-            data = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+            data = _of_lz4(packed, size)
         elif chunk.compression == "":
             data = packed
         else:
@@ -68,6 +69,16 @@ def unpack(file: str, chunk: Chunk, packed: bytes) -> bytes:
         raise _damage(file, chunk, "does not unpack to the size it claims")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise _damage(file, chunk, "has a wrong checksum")
+    return data
+
+
+def _of_lz4(packed: bytes, size: int) -> bytes:
+    """Return what lz4 frames, one after another, unpack to; no more than about `size` bytes."""
+    data = b""
+    while packed and len(data) < size:
+        frame = lz4.frame.LZ4FrameDecompressor()
+        data += frame.decompress(packed, max_length=size + 1 - len(data))
+        packed = frame.unused_data or b""  # None where a frame is not at its end
     return data
 
 
@@ -87,10 +98,12 @@ def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
     return Run(channel, stamps.astype(np.int64), rows[:, MESSAGE_ROW:], ())
 
 
-def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None]) -> list[Run]:
+def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None], work: Work) -> list[Run]:
     """Return the messages of any chunk by channel; `define` is called with its schema and channel records."""
     found: dict[int, tuple[list[int], list[bytes]]] = {}
-    for op, begin, end in records(file, data):
+    number = 0
+    for op, begin, end in records(file, data, work.most_records):
+        number += 1
         if op == Op.MESSAGE:
             if end - begin < MESSAGE_HEAD:
                 raise _damage(file, chunk, "holds a message that ends inside a value")
@@ -100,6 +113,7 @@ def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, byte
             payloads.append(data[begin + MESSAGE_HEAD : end])
         elif op in (Op.SCHEMA, Op.CHANNEL):
             define(op, data[begin:end])
+    work.records_of(chunk.begin, number)
     for times, _ in found.values():
         _check_time(file, chunk, max(times))
     return [_run(channel, times, payloads) for channel, (times, payloads) in sorted(found.items())]
@@ -113,10 +127,13 @@ def _run(channel: int, times: list[int], payloads: list[bytes]) -> Run:
     return Run(channel, np.array(times, dtype=np.int64), rows, ())
 
 
-def records(file: str, data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, begin and end of the content of records that follow one another."""
+def records(file: str, data: bytes, most: int) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, begin and end of the content of records that follow one another; LimitError after the `most`."""
     at, size = 0, len(data)
     while at < size:
+        most -= 1
+        if most < 0:
+            raise LimitError(file, "holds more records than are read of a file of its size")
         if at + RECORD_HEAD > size:
             raise RecordingError(file, "damaged: a record ends inside its head")
         op, length = _op_and_length(data, at)

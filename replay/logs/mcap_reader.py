@@ -19,8 +19,9 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from replay.errors import RecordingError
-from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
+from replay import limits
+from replay.errors import LimitError, RecordingError
+from replay.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.logs.loss import Loss
 from replay.logs.mcap_chunks import MESSAGE_ROW, Run, mixed_runs, regular_run, unpack
 from replay.logs.mcap_records import (
@@ -45,6 +46,7 @@ from replay.logs.mcap_records import (
     read_schema,
 )
 from replay.logs.mcap_summary import read_summary
+from replay.logs.work import Work
 
 
 class McapLog:
@@ -77,12 +79,12 @@ class McapLog:
         self._file = str(path)
         self._salvage = salvage
         self._hint = "" if salvage or data is not None else "; `replay info` and `replay export` salvage what is whole"
-        self._forget()
         try:
             self._size = _size_of(self.path) if data is None else len(data)
             self._stream: BinaryIO = self.path.open("rb") if data is None else io.BytesIO(data)
         except OSError as error:
             raise RecordingError(self._file, f"cannot be read: {error.strerror}") from None
+        self._forget()
         try:
             self._open()
         except OSError as error:
@@ -103,6 +105,8 @@ class McapLog:
         self.message_counts: dict[int, int] | None = None
         self.preamble_holds = False
         self.loss: Loss | None = None
+        self._work = Work(self._file, self._size)
+        self._defined: set[bytes] = set()
 
     def _open(self) -> None:
         head = self._bytes_at(0, min(self._size, LARGEST_POINTER))
@@ -113,7 +117,7 @@ class McapLog:
         try:
             self._walk()
         except RecordingError as error:
-            if not self._salvage or not self.library:
+            if not self._salvage or not self.library or isinstance(error, LimitError):
                 raise
             self._forget()  # what seemed whole may have been read past the damage
             self._walk_to(error)
@@ -121,6 +125,21 @@ class McapLog:
     def attachment(self, attachment: Attachment) -> bytes:
         """Return an attachment's bytes."""
         return self._bytes_at(attachment.begin, attachment.size)
+
+    @property
+    def most_records(self) -> int:
+        """How many records a file of its size may have."""
+        return self._work.most_records
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self._size
+
+    @property
+    def unpacked(self) -> int:
+        """Bytes that all chunks unpack to."""
+        return self._work.unpacked
 
     def schema_name(self, channel: Channel) -> str:
         """Return the name of a channel's message type, "" when it has none."""
@@ -135,10 +154,10 @@ class McapLog:
         """
         if self.message_counts is None or self.loss is not None:
             return None
-        count = self.message_counts.get(channel, 0)
-        if count > sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in self.chunks) // MESSAGE_ROW:
-            raise self._damage(f"its statistics claim {count} messages of one topic, more than it holds")
-        return count
+        number = self.message_counts.get(channel, 0)
+        if number > self._work.unpacked // MESSAGE_ROW:
+            raise self._damage(f"its statistics claim {number} messages of one topic, more than it holds")
+        return number
 
     def chunks_with(self, channels: Collection[int]) -> list[Chunk]:
         """Return the chunks that may hold messages of these channels, so that the others need not be unpacked.
@@ -158,10 +177,11 @@ class McapLog:
         data = unpack(self._file, chunk, self._bytes_at(chunk.begin, chunk.compressed_size))
         run = regular_run(self._file, chunk, data)
         if run is not None:
+            self._work.records_of(chunk.begin, len(run.time))
             self._known(run.channel)
             yield run
             return
-        for run in mixed_runs(self._file, chunk, data, self._define):
+        for run in mixed_runs(self._file, chunk, data, self._define, self._work):
             self._known(run.channel)
             yield run
 
@@ -203,6 +223,8 @@ class McapLog:
                 self._data_record(op, content, at, crc)
                 crc = crc_after(op, content, crc)
                 at = end
+        except LimitError:
+            raise
         except RecordingError as error:
             damage = error
         self.loss = Loss(damage.reason, self._size - at)
@@ -211,7 +233,9 @@ class McapLog:
         """Unpack the chunks that may hold the schemas and channels which the rest of the file does not have."""
         for chunk in self.chunks:
             found = [self.channels.get(number) for number in chunk.channels]
-            if not chunk.loose and not (found and all(c and c.schema_id in (0, *self.schemas) for c in found)):
+            if not chunk.loose and not (
+                found and all(c and (c.schema_id == 0 or c.schema_id in self.schemas) for c in found)
+            ):
                 deque(self.runs(chunk), maxlen=0)
         for channel in self.channels.values():
             if channel.schema_id and channel.schema_id not in self.schemas:
@@ -235,6 +259,7 @@ class McapLog:
     def _data_record(self, op: int, content: bytes, at: int, crc: int) -> None:
         """Take a record of the data section that begins at `at`; `crc` is that of everything before it."""
         cursor, begin = Cursor(self._file, f"the record at byte {at}", content), at + RECORD_HEAD
+        self._work.record()
         if at == len(MAGIC) and op != Op.HEADER:
             raise self._damage("its first record is not a header")
         if op == Op.HEADER:
@@ -244,6 +269,7 @@ class McapLog:
             self._define(op, content)
         elif op == Op.CHUNK:
             chunk = read_chunk(cursor, begin)
+            self._work.unpack(min(chunk.uncompressed_size, MAX_CHUNK))  # a larger one is refused by itself
             if self._salvage:
                 deque(self.runs(chunk), maxlen=0)
             self.chunks.append(chunk)
@@ -253,9 +279,12 @@ class McapLog:
         elif op == Op.ATTACHMENT:
             attachment = read_attachment(cursor, begin)
             stored = cursor.unsigned(4)
-            check_crc(self._file, stored, zlib.crc32(content[: cursor.at - 4]), f"attachment {attachment.name!r}")
+            check_crc(
+                self._file, stored, zlib.crc32(memoryview(content)[: cursor.at - 4]), f"attachment {attachment.name!r}"
+            )
             self.attachments.append(attachment)
         elif op == Op.METADATA:
+            self._work.define(len(content), 0)
             name, values = cursor.text(), cursor.mapping()
             if name == PREAMBLE:
                 self.preamble_holds = values.get("crc32") == str(crc)
@@ -270,6 +299,7 @@ class McapLog:
 
     def _loose_message(self, begin: int, size: int) -> None:
         """Take messages outside chunks as an unpacked chunk without a checksum of its own."""
+        self._work.unpacked += size
         last = self.chunks[-1] if self.chunks else None
         if last is not None and last.follows_on(begin) and last.compressed_size + size <= MAX_CHUNK:
             self.chunks.pop()
@@ -278,11 +308,17 @@ class McapLog:
 
     def _summary(self, start: int) -> None:
         size = self._size - len(MAGIC) - start
-        if size < 0 or size > MAX_RECORD or self._bytes_at(self._size - len(MAGIC), len(MAGIC)) != MAGIC:
+        if size > limits.SUMMARY:
+            raise LimitError(self._file, f"has a summary of {size} bytes; at most {limits.SUMMARY} are read")
+        if size < 0 or self._bytes_at(self._size - len(MAGIC), len(MAGIC)) != MAGIC:
             raise self._damage("its end is missing or is not that of an MCAP file")
-        self.message_counts = read_summary(self._file, self._bytes_at(start, size), start, self._define)
+        self.message_counts = read_summary(self._file, self._bytes_at(start, size), start, self._define, self._work)
 
     def _define(self, op: int, content: bytes) -> None:
+        if content in self._defined:
+            return
+        self._defined.add(content)
+        self._work.define(len(content), max(len(self.schemas), len(self.channels)))
         cursor = Cursor(self._file, "a schema or channel", content)
         if op == Op.SCHEMA:
             number, schema = read_schema(cursor)

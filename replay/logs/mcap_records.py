@@ -7,6 +7,7 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 
+from replay import limits
 from replay.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -18,9 +19,9 @@ FOOTER_BYTES = 20
 """Bytes of the footer's content: start of the summary (8), start of its offsets (8), checksum (4)."""
 PRIVATE = 0x80
 """Opcodes from here on are an application's own."""
-MAX_RECORD = 1 << 30
+MAX_RECORD = limits.RECORD
 """Largest record [bytes] that is read or written; a larger length is damage or an attack."""
-MAX_CHUNK = 1 << 28
+MAX_CHUNK = limits.CHUNK
 """Largest chunk [bytes, unpacked] that is read or written."""
 PREAMBLE = "preamble"
 """Name of our metadata record that closes the part before the first chunk: `crc32` of all bytes before it.
@@ -116,10 +117,14 @@ class Cursor:
 
     def take(self, size: int) -> bytes:
         """Return the next `size` bytes; RecordingError when there are fewer."""
+        self.skip(size)
+        return bytes(self._data[self.at - size : self.at])
+
+    def skip(self, size: int) -> None:
+        """Pass over the next `size` bytes; RecordingError when there are fewer."""
         if size > len(self._data) - self.at:
             raise RecordingError(self._file, f"damaged: {self._what} ends inside a value")
         self.at += size
-        return bytes(self._data[self.at - size : self.at])
 
     def unsigned(self, size: int) -> int:
         """Return the next unsigned integer of `size` bytes."""
@@ -165,7 +170,7 @@ def read_chunk(cursor: Cursor, begin: int) -> Chunk:
     compression = cursor.text()
     compressed = cursor.unsigned(8)
     chunk = Chunk(size, crc, compression, begin + cursor.at, compressed)
-    cursor.take(compressed)
+    cursor.skip(compressed)
     return chunk
 
 
@@ -175,7 +180,7 @@ def read_attachment(cursor: Cursor, begin: int) -> Attachment:
     name, media_type = cursor.text(), cursor.text()
     size = cursor.unsigned(8)
     attachment = Attachment(name, media_type, begin + cursor.at, size)
-    cursor.take(size)
+    cursor.skip(size)
     return attachment
 
 

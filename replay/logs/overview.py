@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.joint_messages import TRANSFORMS, Decoder, decoder, kind_of
 from replay.logs.mcap_reader import McapLog
@@ -59,14 +60,14 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
         RecordingError: damage.
     """
     counts = dict.fromkeys(log.channels, 0)
-    begins, ends = [], []
+    begin, end = None, None
     ranges: dict[tuple[str, str], _Range] = {}
     decoders = {n: decode for n, channel in log.channels.items() if joints and (decode := _decoder(log, channel))}
     for chunk in log.chunks:
         for run in log.runs(chunk):
             counts[run.channel] = counts.get(run.channel, 0) + len(run.time)
-            begins.append(int(run.time.min()))
-            ends.append(int(run.time.max()))
+            first, last = int(run.time.min()), int(run.time.max())
+            begin, end = first if begin is None else min(begin, first), last if end is None else max(end, last)
             if run.channel not in decoders:
                 continue
             topic = log.channels[run.channel].topic
@@ -75,6 +76,8 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
                     for sample in decoders[run.channel](message):
                         for joint, position in sample.positions:
                             ranges.setdefault((topic, joint), _Range()).add(position)
+                    if len(ranges) > limits.JOINTS:
+                        raise RecordingError(topic, "names more joints than a machine has")
             except RecordingError:  # JSON of another kind, say
                 del decoders[run.channel]
                 ranges = {key: found for key, found in ranges.items() if key[0] != topic}
@@ -84,8 +87,8 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
         messages[key] = messages.get(key, 0) + counts[number]
     return Overview(
         tuple(TopicSummary(topic, schema, count) for (topic, schema), count in sorted(messages.items())),
-        min(begins, default=None),
-        max(ends, default=None),
+        begin,
+        end,
         tuple(found.summary(topic, joint) for (topic, joint), found in sorted(ranges.items())),
     )
 

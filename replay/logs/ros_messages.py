@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.ros_schema import long_name, standard_types, types_of
@@ -30,6 +31,9 @@ def ros_decoder(name: str, channel: Channel, schema: Schema | None) -> Callable[
     """
     if schema is None or schema.encoding not in _DEFINITIONS.get(channel.encoding, ()):
         return None
+    if len(schema.data) > limits.DEFINITION_TEXT:
+        rule = f"has a definition of {len(schema.data)} bytes; at most {limits.DEFINITION_TEXT} are read"
+        raise RecordingError(name, f"topic {channel.topic!r} {rule}")
     ros1 = channel.encoding == "ros1"
     decode, text = decode_ros1 if ros1 else decode_cdr, schema.data.decode(errors="replace")
     try:

@@ -65,10 +65,10 @@ def types_of(name: str, text: str, *, ros1: bool = False) -> Types:
 
     own = long_name(name)
     try:
-        if re.search(r"^\s*module\s+\w+", text, re.MULTILINE):
+        if re.search(r"^[ \t]*module\s+\w+", text, re.MULTILINE):
             parts = text.split(_IDL_SEPARATOR)
             bodies = [
-                re.sub(r"\A\s*IDL: .*\n|^\s*#.*$", "", part, flags=re.MULTILINE) for part in parts if part.strip()
+                re.sub(r"\A\s*IDL: .*\n|^[ \t]*#.*$", "", part, flags=re.MULTILINE) for part in parts if part.strip()
             ]
             found = {key: value for body in bodies for key, value in get_types_from_idl(body).items()}
         else:

@@ -10,6 +10,7 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
+from replay import limits
 from replay.logs.ros_schema import Field, Types
 
 _CODES = {
@@ -113,7 +114,8 @@ class _Reader:
         self._begin = begin
         self._encoding = encoding
         self._memo = memo
-        self._left = len(data) + 1000  # a struct without fields takes no byte, and one may hold many of many
+        # a struct without fields takes no byte, and one may hold many of many
+        self._left = min(len(data) + 1000, limits.MESSAGE_VALUES)
         self._unsigned = struct.Struct(f"{encoding.order}I").unpack_from
         self._step = min(4, encoding.align) - 1
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.values import Values, value_decoder
@@ -45,23 +46,31 @@ def topic_table(log: McapLog, topic: str) -> tuple[dict[str, NDArray[Any]], str]
             for channel in log.channels.values()
             if channel.topic == topic
         }
-        rows = [_row(decoders[channel], data) for _, channel, data in found]
+        columns = _columns(found, lambda channel, data: _row(decoders[channel], data))
     except RecordingError as error:
         reason = error.reason
     except Exception as error:  # each format's library fails in ways of its own on bytes that are not its messages
         reason = str(error).partition("\n")[0][:200] or type(error).__name__
     if reason:
-        rows = [{"data": data} for _, _, data in found]
+        columns = _columns(found, lambda _, data: {"data": data})
     elif any(decoder is None for decoder in decoders.values()):
         kinds = {c.encoding or "bytes" for c in log.channels.values() if decoders.get(c.id, c) is None}
         reason = f"messages as {', '.join(sorted(kinds))} with such a schema are not decoded"
+    return {name: _array(values, len(found)) for name, values in columns.items()}, reason
+
+
+def _columns(found: Sequence[tuple[int, int, bytes]], row: Callable[[int, bytes], Values]) -> dict[str, list[Any]]:
+    """Return the values of messages by column, as `row` takes them apart; ValueError where they are too many."""
     columns: dict[str, list[Any]] = {TIME: [time for time, _, _ in found]}
-    for index, row in enumerate(rows):
-        for name, value in _flat(row, ""):
+    for index, (_, channel, data) in enumerate(found):
+        for name, value in _flat(row(channel, data), ""):
             column = columns.setdefault(name if name != TIME else f"message {TIME}", [])
             column.extend([None] * (index - len(column)))
-            column.append(value)
-    return {name: _array(values, len(found)) for name, values in columns.items()}, reason
+            if len(column) == index:  # else two fields have one name
+                column.append(value)
+        if len(columns) > 2 and (len(columns) > limits.COLUMNS or len(columns) * len(found) > limits.CELLS):
+            raise ValueError(f"its values make a table of more than {limits.COLUMNS} columns or {limits.CELLS} cells")
+    return columns
 
 
 def _messages(log: McapLog, topic: str) -> Iterator[tuple[int, int, bytes]]:
@@ -74,7 +83,11 @@ def _messages(log: McapLog, topic: str) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _row(decode: Any, data: bytes) -> Values:
-    return {"data": data} if decode is None else _by_joint(decode(data))
+    if decode is None:
+        return {"data": data}
+    if len(data) > limits.MESSAGE:
+        raise ValueError(f"a message has {len(data)} bytes; at most {limits.MESSAGE} are taken apart")
+    return _by_joint(decode(data))
 
 
 def _by_joint(values: Values) -> Values:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor
 
+from replay import limits
+from replay.json_text import read_json
 from replay.logs.mcap_records import Channel, Schema
 from replay.logs.protobuf import message_type
 from replay.logs.ros_messages import ros_decoder
@@ -30,30 +31,45 @@ def value_decoder(file: str, channel: Channel, schema: Schema | None) -> Callabl
         return None
     if channel.encoding == "protobuf" and schema.encoding == "protobuf":
         type_ = message_type(file, schema.name, schema.data)
-        return lambda data: _protobuf(type_.FromString(data))
+        return lambda data: _Values().of(type_.FromString(data))
     return ros_decoder(file, channel, schema)
 
 
 def _json(data: bytes) -> Values:
-    values = json.loads(data)
+    values = read_json(data, most=limits.MESSAGE)
     return values if isinstance(values, dict) else {"value": values}
 
 
-def _protobuf(message: Any) -> Values:
-    """Return a message's fields; those of messages inside it only where they are set."""
-    values = {}
-    for field in message.DESCRIPTOR.fields:
-        value = getattr(message, field.name)
-        if field.type != FieldDescriptor.TYPE_MESSAGE:
-            values[field.name] = list(value) if field.is_repeated else value
-        elif field.message_type.GetOptions().map_entry:
-            values[field.name] = {str(key): _in_map(value[key]) for key in value}
-        elif field.is_repeated:
-            values[field.name] = [_protobuf(item) for item in value]
-        elif message.HasField(field.name):
-            values[field.name] = _protobuf(value)
-    return values
+class _Values:
+    """Takes one message apart, up to the number of values that are read of one."""
 
+    def __init__(self) -> None:
+        self._left = limits.MESSAGE_VALUES
 
-def _in_map(value: Any) -> Any:
-    return _protobuf(value) if hasattr(value, "DESCRIPTOR") else value
+    def of(self, message: Any) -> Values:
+        """Return a message's fields; those of messages inside it only where they are set.
+
+        Raises:
+            ValueError: there are too many.
+        """
+        values: dict[str, Any] = {}
+        for field in message.DESCRIPTOR.fields:
+            value = getattr(message, field.name)
+            self._count(len(value) if field.is_repeated else 1)
+            if field.type != FieldDescriptor.TYPE_MESSAGE:
+                values[field.name] = list(value) if field.is_repeated else value
+            elif field.message_type.GetOptions().map_entry:
+                values[field.name] = {str(key): self._in_map(value[key]) for key in value}
+            elif field.is_repeated:
+                values[field.name] = [self.of(item) for item in value]
+            elif message.HasField(field.name):
+                values[field.name] = self.of(value)
+        return values
+
+    def _in_map(self, value: Any) -> Any:
+        return self.of(value) if hasattr(value, "DESCRIPTOR") else value
+
+    def _count(self, values: int) -> None:
+        self._left -= values
+        if self._left < 0:
+            raise ValueError(f"a message holds more than the {limits.MESSAGE_VALUES} values that are taken apart")

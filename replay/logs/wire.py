@@ -178,6 +178,7 @@ class _Walk:
         self.mask = np.full(len(data), 0xFF, dtype=np.uint8)
         self.slots: dict[str, Slot] = {}
         self.texts: dict[str, str | bytes] = {}
+        self._needed: dict[str, frozenset[int]] = {}
 
     def message(self, descriptor: Any, begin: int, end: int, prefix: str, depth: int) -> None:
         if depth > _MAX_DEPTH:
@@ -196,9 +197,16 @@ class _Walk:
             at = self.field(field, tag & 7, at, prefix + field.name, index, depth)
         if at != end:
             raise _Irregular
-        for field in descriptor.fields:
-            if not field.is_repeated and not field.has_presence and field.number not in seen:
-                raise _Irregular
+        if not self.needed(descriptor) <= seen.keys():
+            raise _Irregular
+
+    def needed(self, descriptor: Any) -> frozenset[int]:
+        """Return the fields of a message type that are left out only where they are zero."""
+        found = self._needed.get(descriptor.full_name)
+        if found is None:
+            plain = (field for field in descriptor.fields if not field.is_repeated and not field.has_presence)
+            self._needed[descriptor.full_name] = found = frozenset(field.number for field in plain)
+        return found
 
     def field(self, field: FieldDescriptor, wire: int, at: int, path: str, index: int, depth: int) -> int:
         if wire == _WIRE_LENGTH:

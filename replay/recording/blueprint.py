@@ -7,23 +7,35 @@ from typing import Any
 
 import numpy as np
 
+from replay.collision.columns import CollisionColumns
+from replay.numerics.columns import Field
 from replay.recording.scene_view import Floats
+from replay.sensing.kind import SensorKind
+from replay.sensing.kinds import KINDS
 
 SCENE = "scene"
-DISTANCE = "distance"
-CAPACITIVE = "capacitive"
 CLEARANCE = "clearance"
 JOINTS = "joints"
 EVENTS = "events"
 SCENARIO = "scenario"
 TIMELINE = "time"
 
-_TITLES = {
-    DISTANCE: "Distance to the closest point [m]",
-    CAPACITIVE: "Capacitive sensors: drop of the output voltage [V]",
-    CLEARANCE: "Clearance of pairs that are near [m]",
+
+def _charted(kind: SensorKind) -> dict[str, Field]:
+    """Return the fields that have a chart by its name; that of a kind's first one is called like the kind."""
+    fields = [field for field in kind.columns.fields() if field.chart]
+    return {f"{kind.name}_{field.name}" if k else kind.name: field for k, field in enumerate(fields)}
+
+
+CHARTED = {kind.name: _charted(kind) for kind in KINDS.values()}
+"""The fields of each kind of sensor that have a chart, by the chart's name."""
+CHARTS = {
+    **{chart: field.chart for fields in CHARTED.values() for chart, field in fields.items()},
+    CLEARANCE: next(field.chart for field in CollisionColumns.fields() if field.chart),
     JOINTS: "Joint positions [rad, m]",
 }
+"""Titles of all charts, in the order in which they are shown."""
+
 _VIEW_DIRECTION = np.array([1.1, -1.5, 0.75])
 _HALF_VIEW = np.tan(np.radians(55.0) / 2.0)  # the viewer's field of view
 _AROUND = 1.1  # room around the scene
@@ -38,14 +50,14 @@ def recording(charts: Collection[str], eye: Any, axis: Any) -> Any:
     """Return the rerun blueprint of one recording.
 
     Args:
-        charts: which of DISTANCE, CAPACITIVE, CLEARANCE and JOINTS have curves.
+        charts: which of CHARTS have curves.
         eye: from where the scene is looked at, see `eye_of`.
         axis: time axis of the charts, see `axis_until`.
     """
     import rerun.blueprint as rrb
 
-    readings = [chart(name, axis) for name in (DISTANCE, CAPACITIVE, CLEARANCE) if name in charts]
-    behind = [chart(name, axis) for name in (JOINTS,) if name in charts]
+    readings = [chart(name, axis) for name in CHARTS if name in charts and name != JOINTS]
+    behind = [chart(JOINTS, axis)] if JOINTS in charts else []
     scenario = rrb.TextDocumentView(origin=f"/{SCENARIO}", name="Scenario")
     below = rrb.Tabs(event_table(), *behind, scenario, active_tab=0)
     return whole(rrb.Horizontal(scene_view(eye), rrb.Vertical(*readings, below), column_shares=[3, 2]))
@@ -66,7 +78,7 @@ def side_by_side(sides: Sequence[str], charts: Sequence[str], eye: Any, end: int
     columns = []
     for side in sides:
         prefix = f"/{rr.escape_entity_path_part(side)}"
-        curves = [chart(name, axis_until(end), prefix) for name in _TITLES if name in charts]
+        curves = [chart(name, axis_until(end), prefix) for name in CHARTS if name in charts]
         below = [rrb.Tabs(*curves, active_tab=0)] if curves else []
         shares = [5, 3, 2] if curves else [5, 2]
         columns.append(rrb.Vertical(scene_view(eye, prefix, side), *below, event_table(prefix), row_shares=shares))
@@ -159,7 +171,7 @@ def chart(name: str, axis: Any, prefix: str = "") -> Any:
 
     return rrb.TimeSeriesView(
         origin=f"{prefix}/{name}",
-        name=_TITLES[name],
+        name=CHARTS[name],
         axis_x=axis,
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )

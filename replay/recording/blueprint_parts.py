@@ -22,7 +22,7 @@ class RecordingBlueprint:
     """The arrangement that `blueprint.recording` describes, as rerun's `send_blueprint` takes it.
 
     Args:
-        charts: which of DISTANCE, CAPACITIVE, CLEARANCE and JOINTS have curves.
+        charts: which of `blueprint.CHARTS` have curves.
         corners: (n, 3) points [m] in world coordinates that the first picture should show.
         end: time [ns] at which the charts end.
     """

@@ -20,6 +20,7 @@ from replay.recording.events import SEVERITY, Events, Transition
 
 TOPIC = "/events"
 
+_FIELDS = ("timestamp", "message", "name", "file", "line")
 _TIME_TAG = 0x0A  # field 1, a message
 _LINE_TAG = 0x35  # field 6, four bytes, little-endian
 _LINE_BYTES = 5
@@ -79,6 +80,10 @@ class _Decoder:
             raise RecordingError(self._file, f"damaged: topic {TOPIC!r} does not hold {messages.LOG}")
         self._ours = schema == messages.schema(messages.LOG)
         self._type: Any = message_type(self._file, schema.name, schema.data)
+        mine = {field.name: field for field in self._type.DESCRIPTOR.fields}
+        for field in messages.message_class(messages.LOG).DESCRIPTOR.fields:
+            if field.name in _FIELDS and not _alike(field, mine.get(field.name)):
+                raise RecordingError(self._file, f"damaged: {messages.LOG} in it has no usable field {field.name!r}")
         self._bodies: dict[bytes, int] = {}
         self._codes: dict[Transition, int] = {}
 
@@ -138,6 +143,11 @@ def _body(log: Any, what: Transition) -> bytes:
         deterministic=True
     )
     return body
+
+
+def _alike(field: Any, other: Any) -> bool:
+    """Return whether a field that a file describes holds what ours does."""
+    return other is not None and (field.type, field.is_repeated) == (other.type, other.is_repeated)
 
 
 def _transition(found: Any) -> Transition | None:

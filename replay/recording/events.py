@@ -1,4 +1,4 @@
-"""What begins and what ends in a recording: contacts, bounds, detections, saturation; found from the columns."""
+"""What begins and what ends in a recording: of pairs and of sensors, found from the columns."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.columns import Level
-from replay.sensing.columns import Detection
+from replay.collision.columns import CollisionColumns
+from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
 
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
-SEVERITY = {"contact": 4, "undecided": 3, "saturation": 3, "too close": 3, "bounds": 3, "detection": 2}
+_FIELDS = [*CollisionColumns.fields(), *(field for kind in KINDS.values() for field in kind.columns.fields())]
+SEVERITY = {event: severity for field in _FIELDS for event, severity in field.events.items()}
 """Foxglove's log level of the beginning of each kind of event; the end of any is information (2)."""
 _INFORMATION = 2
 
@@ -27,8 +28,8 @@ class Transition:
     """What begins or ends, in no particular frame.
 
     Attributes:
-        kind: "bounds" (the bounding volumes of a pair meet, whether or not the shapes do), "contact", "undecided",
-            "detection", "too close" or "saturation".
+        kind: "bounds" (the bounding volumes of a pair meet, whether or not the shapes do), "contact", "undecided", or
+            what the columns of a sensor kind call it, such as "detection".
         begins: whether it begins; else it ends.
         subject: the pair or the sensor.
         source: the topic that says so.
@@ -186,26 +187,18 @@ class EventFinder:
 
 def _subjects(layout: Layout) -> Iterator[tuple[str, str, str]]:
     """Yield kind, name and topic of whatever may begin or end, in the order in which it is told."""
-    groups = [
-        ("/collision", layout.pairs, ("bounds", "contact", "undecided")),
-        ("/distance", layout.distance_sensors, ("detection", "too close")),
-        ("/capacitive", layout.capacitive_sensors, ("saturation",)),
-    ]
-    for topic, names, kinds in groups:
-        for kind in kinds:
-            for name in names:
-                yield kind, name, topic if topic == "/collision" else f"{topic}/{name}"
+    groups = [(CollisionColumns.fields(), dict.fromkeys(layout.pairs, "/collision"))]
+    for kind in KINDS.values():
+        names = layout.sensors.get(kind.name, ())
+        groups.append((kind.columns.fields(), {name: kind.topic(name) for name in names}))
+    for fields, topics in groups:
+        for field in fields:
+            for event in field.events:
+                yield from ((event, name, topic) for name, topic in topics.items())
 
 
 def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:
-    if block.collision is not None:
-        level = block.collision.level
-        yield "bounds", level >= Level.BOUNDS
-        yield "contact", level >= Level.CONTACT
-        yield "undecided", block.collision.undecided
-    if block.distance is not None:
-        status = block.distance.status
-        yield "detection", status != Detection.NOTHING
-        yield "too close", status == Detection.TOO_CLOSE
-    if block.capacitive is not None:
-        yield "saturation", block.capacitive.saturated
+    for columns in (block.collision, *(block.readings.get(kind) for kind in KINDS)):
+        for field in () if columns is None else columns.fields():
+            for state, event in enumerate(field.events, start=1):
+                yield event, getattr(columns, field.name) >= state

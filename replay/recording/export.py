@@ -17,24 +17,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.columns import Level
-from replay.errors import InvalidValue
+from replay import limits
+from replay.errors import InvalidValue, LimitError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
 from replay.logs.tables import topic_table
+from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
 from replay.recording.topics import WORLD
-from replay.sensing.columns import Detection
+from replay.sensing.kinds import KINDS
+from replay.simulation import Layout
 
 Column = NDArray[Any]
 Table = dict[str, Column]
 Format = Literal["csv", "json", "parquet"]
 
 FORMATS: tuple[Format, ...] = ("csv", "json", "parquet")
-
-_LEVELS = np.array([level.name.lower() for level in Level])
-_DETECTIONS = np.array([status.name.lower() for status in Detection])
 
 
 def tables(recording: Recording) -> dict[str, Table]:
@@ -50,11 +49,20 @@ def tables(recording: Recording) -> dict[str, Table]:
         _vector(result["/tf"], place, " [m]", recording.link_poses[:, link, :3, 3], "xyz")
         _vector(result["/tf"], f"{place} quat", "", recording.link_quaternions[:, link], "xyzw")
     if recording.collision is not None:
-        result["/collision"] = {**time, **_collision(recording)}
-    for sensor, name in enumerate(layout.distance_sensors if recording.distance is not None else ()):
-        result[f"/distance/{name}"] = {**time, **_distance(recording, sensor)}
-    for sensor, name in enumerate(layout.capacitive_sensors if recording.capacitive is not None else ()):
-        result[f"/capacitive/{name}"] = {**time, **_capacitive(recording, sensor)}
+        result["/collision"] = dict(time)
+        for pair, name in enumerate(layout.pairs):
+            for field in recording.collision.fields():
+                values = getattr(recording.collision, field.name)[:, pair]
+                _add(result["/collision"], f"{name} {field.label}", field, values, layout)
+    for kind, columns in recording.readings.items():
+        for sensor, name in enumerate(layout.sensors[kind]):
+            table = result[KINDS[kind].topic(name)] = dict(time)
+            for field in columns.fields():
+                values = getattr(columns, field.name)[:, sensor]
+                for k, each in enumerate(getattr(layout, field.each) if field.each else ()):
+                    _add(table, f"{each} {field.label}", field, values[:, k], layout)
+                if not field.each:
+                    _add(table, field.label, field, values, layout)
     events = recording.events.columns()
     result["/events"] = {"time [ns]": events.pop("time"), **events}
     return result
@@ -94,6 +102,9 @@ def export(
         if not fnmatch.filter(sources, pattern):
             raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
     chosen = [topic for topic in sorted(sources) if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)]
+    if isinstance(recording, McapLog) and len(chosen) * recording.unpacked > limits.passes(recording.size):
+        rule = f"has {len(chosen)} topics to be looked for in {recording.unpacked} bytes; choose some with --topic"
+        raise LimitError(str(recording.path), rule)
     directory = Path(directory)
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")
     if format == "json":
@@ -122,47 +133,17 @@ def _sources(recording: Recording | McapLog, tell: Callable[[str], object]) -> d
     return {topic: functools.partial(table, topic) for topic in {channel.topic for channel in log.channels.values()}}
 
 
-def _collision(recording: Recording) -> Table:
-    columns, table = recording.collision, Table()
-    assert columns is not None
-    for pair, name in enumerate(recording.layout.pairs):
-        table[f"{name} level"] = _LEVELS[columns.level[:, pair]]
-        table[f"{name} clearance [m]"] = columns.clearance[:, pair]
-        table[f"{name} evaluated"] = columns.evaluated[:, pair]
-        table[f"{name} undecided"] = columns.undecided[:, pair]
-    return table
-
-
-def _distance(recording: Recording, sensor: int) -> Table:
-    columns = recording.distance
-    assert columns is not None
-    shapes = np.array([*recording.layout.shapes, ""])  # the last one, index -1, while nothing is detected
-    table: Table = {
-        "status": _DETECTIONS[columns.status[:, sensor]],
-        "distance [m]": columns.distance[:, sensor],
-    }
-    _vector(table, f"point in {WORLD}", " [m]", columns.point[:, sensor], "xyz")
-    _vector(table, "point in sensor", " [m]", columns.point_sensor[:, sensor], "xyz")
-    _vector(table, f"normal in {WORLD}", "", columns.normal[:, sensor], "xyz")
-    table["shape"] = shapes[columns.shape[:, sensor]]
-    table["triangle"] = columns.triangle[:, sensor]
-    table["case"] = columns.case[:, sensor]
-    return table
-
-
-def _capacitive(recording: Recording, sensor: int) -> Table:
-    columns = recording.capacitive
-    assert columns is not None
-    table: Table = {
-        "capacitance [F]": columns.capacitance[:, sensor],
-        "output voltage [V]": columns.output_voltage[:, sensor],
-        "delta output [V]": columns.delta_output[:, sensor],
-        "saturated": columns.saturated[:, sensor],
-        "touching": columns.touching[:, sensor],
-    }
-    for index, name in enumerate(recording.layout.objects):
-        table[f"{name} capacitance [F]"] = columns.per_object[:, sensor, index]
-    return table
+def _add(table: Table, label: str, field: Field, values: Column, layout: Layout) -> None:
+    """Add a field (F,) or (F, letters) to a table: states by their names, what counts names by these."""
+    unit = f" [{field.unit}]" if field.unit else ""
+    if field.letters:
+        _vector(table, label, unit, values, field.letters)
+        return
+    if field.states is not None:
+        values = np.array([state.name.lower() for state in field.states])[values]
+    if field.names:
+        values = np.array([*getattr(layout, field.names), ""])[values]  # the last one, index -1, while there is nothing
+    table[f"{label}{unit}"] = values
 
 
 def _vector(table: Table, name: str, unit: str, values: Column, letters: str) -> None:

@@ -1,19 +1,20 @@
-"""The message types of a recording: our own, from the compiled `schemas/*.proto`, and Foxglove's."""
+"""The message types of a recording: our own, made of the fields that they carry, and Foxglove's."""
 
 from __future__ import annotations
 
 import functools
-from importlib import resources
 from typing import Any
 
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf import descriptor_pool, message_factory
 
+from replay.collision.columns import CollisionColumns
 from replay.logs.mcap_records import Schema
 from replay.logs.protobuf import descriptor_set
+from replay.numerics.columns import Columns
+from replay.recording.made_types import message_file
+from replay.sensing.kinds import KINDS
 
 COLLISION = "replay.CollisionStates"
-DISTANCE = "replay.DistanceReading"
-CAPACITIVE = "replay.CapacitiveReading"
 JOINTS = "foxglove.JointStates"
 TRANSFORMS = "foxglove.FrameTransforms"
 SCENE = "foxglove.SceneUpdate"
@@ -22,7 +23,7 @@ LOG = "foxglove.Log"
 
 @functools.cache
 def message_class(name: str) -> Any:
-    """Return the class of the message type `name`, one of the constants of this module."""
+    """Return the class of the message type `name`: one of the constants of this module, or that of a sensor kind."""
     if name.startswith("foxglove."):
         return _foxglove(name)
     return message_factory.GetMessageClass(_own_types().FindMessageTypeByName(name))
@@ -36,10 +37,11 @@ def schema(name: str) -> Schema:
 
 @functools.cache
 def _own_types() -> Any:
-    compiled = resources.files("replay.recording").joinpath("replay.binpb").read_bytes()
+    types: dict[str, type[Columns]] = {COLLISION: CollisionColumns}
+    types |= {kind.message: kind.columns for kind in KINDS.values()}
     pool = descriptor_pool.DescriptorPool()
-    for file in descriptor_pb2.FileDescriptorSet.FromString(compiled).file:
-        pool.AddSerializedFile(file.SerializeToString())
+    for name, columns in types.items():
+        pool.AddSerializedFile(message_file(name, columns.fields()).SerializeToString())
     return pool
 
 

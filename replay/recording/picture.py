@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
-import os
 import re
 import shutil
-import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,29 +15,13 @@ from typing import IO, Any
 from replay.errors import ViewerError
 from replay.logs.part_file import write_file
 from replay.recording.blueprint import TIMELINE
+from replay.recording.viewer_process import LOOPBACK, free_port, quarters, running, viewer_binary
 
 _STARTUP = 60.0  # [s] until the viewer must answer
-_ENDING = 10.0  # [s] until a viewer that is asked to end is killed
 _LOADING = 120.0  # [s] until the picture must have come to rest
 _TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
 _TYPED = 10_000_000  # [ns] by which a moment may be after the end: the end typed with few digits
-
-
-def viewer_binary() -> Path:
-    """Return the viewer program that comes with the rerun package.
-
-    The `rerun` script beside it starts it as a child, which then outlives a script that is stopped.
-
-    Raises:
-        ViewerError: the package has none.
-    """
-    spec = importlib.util.find_spec("rerun_cli")
-    folder = Path(spec.origin).parent if spec and spec.origin else None
-    name = "rerun.exe" if sys.platform == "win32" else "rerun"
-    if folder is None or not (folder / name).is_file():
-        raise ViewerError("the rerun viewer is not installed; pip install rerun-sdk brings it")
-    return folder / name
 
 
 def picture(
@@ -90,37 +70,16 @@ def picture(
 
 @contextlib.contextmanager
 def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
-    """Run a viewer of its own, which nobody else can reach, and yield the client that steers it.
-
-    It finds an empty home: nobody's settings change the picture, and in its first session it sends no usage data.
-    """
+    """Run a viewer of its own, which nobody else can reach, and yield the client that steers it."""
     from rerun.experimental import ViewerClient
 
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    port = free_port()
+    command = [str(viewer_binary()), "--headless", "--bind", LOOPBACK, "--port", str(port)]
     command += ["--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen"]
-    with tempfile.TemporaryFile("w+") as log, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home:
-        places = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "APPDATA", "LOCALAPPDATA")
-        environment = {**os.environ, **dict.fromkeys(places, home)}
-        process = subprocess.Popen(
-            [*command, _plain_name(recording, Path(home))], stdout=log, stderr=subprocess.STDOUT, env=environment
-        )
-        try:
-            yield _connect(ViewerClient, f"rerun+http://127.0.0.1:{port}/proxy", process, log)
-        finally:
-            end(process)
-
-
-def end(viewer: subprocess.Popen[bytes]) -> None:
-    """End a viewer, unless it has ended."""
-    viewer.terminate()
-    try:
-        viewer.wait(timeout=_ENDING)
-    except subprocess.TimeoutExpired:
-        viewer.kill()
-        viewer.wait()
+    with tempfile.TemporaryFile("w+") as log, quarters() as where:
+        command.append(_plain_name(recording, where.home))
+        with running(command, where, stdout=log, stderr=subprocess.STDOUT) as process:
+            yield _connect(ViewerClient, f"rerun+http://{LOOPBACK}:{port}/proxy", process, log)
 
 
 def _plain_name(recording: Path, folder: Path) -> str:

@@ -5,7 +5,6 @@ Nothing here depends on the machine's name, the clock or a path, so that the sam
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import hashlib
 import json
@@ -14,10 +13,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata, resources
 from importlib.resources.abc import Traversable
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import FailFast, Field
+from typing_extensions import TypedDict
 
 import replay
-from replay.errors import RecordingError
+from replay import limits
+from replay.errors import LimitError, RecordingError
+from replay.json_text import read_json, typed
 from replay.simulation import BLOCK_FRAMES, Layout
 
 FORMAT = 1
@@ -27,8 +31,6 @@ READABLE_FORMATS = (1,)
 RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
-
-_SOURCES = (".py", ".binpb")
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Provenance:
 
     def to_metadata(self) -> dict[str, str]:
         """Return the values of the MCAP metadata record, each as JSON with sorted keys; `originals` only if any."""
-        values = vars(self) | {"layout": vars(self.layout)}
+        values = vars(self) | {"layout": self.layout.to_json()}
         if not self.originals:
             del values["originals"]
         return {key: json.dumps(value, sort_keys=True, ensure_ascii=False) for key, value in values.items()}
@@ -77,24 +79,51 @@ class Provenance:
         Raises:
             RecordingError: the format version is not one that is read, or a value is missing or not what it should be.
         """
+        if sum(map(len, values.values())) > limits.RECORD_JSON:
+            raise LimitError(file, f"has metadata of more than {limits.RECORD_JSON} bytes")
         try:
-            version = json.loads(values["format"])
+            version = read_json(values["format"])
             if version not in READABLE_FORMATS:
                 readable = " and ".join(map(str, READABLE_FORMATS))
                 raise RecordingError(file, f"has recording format {version}; this version of replay reads {readable}")
             written = {"originals": "{}", **values}
-            known = {field.name: json.loads(written[field.name]) for field in dataclasses.fields(Provenance)}
-            layout = {field.name: known["layout"][field.name] for field in dataclasses.fields(Layout)}
-            if not all(isinstance(name, str) for group in layout.values() for name in group):
-                raise TypeError("names must be texts")
-            known["layout"] = Layout(**{key: tuple(group) for key, group in layout.items()})
-            if not isinstance(known["frames"], int) or not isinstance(known["block_frames"], int):
-                raise TypeError("frame counts must be integers")
-            if not all(isinstance(text, str) for origin in known["originals"].values() for text in origin.values()):
-                raise TypeError("names and digests of originals must be texts")
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise RecordingError(file, f"damaged: its metadata cannot be used ({error!r})") from None
-        return Provenance(**known)
+            known = typed({name: read_json(written[name]) for name in _WRITTEN if name in written}, _Written)
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(file, f"damaged: its metadata cannot be used ({error})") from None
+        if sum(map(len, known["layout"].values())) > limits.NAMES:
+            raise LimitError(file, f"has more than {limits.NAMES} names of links, joints, pairs and sensors")
+        try:
+            layout = Layout.from_json(known["layout"])
+        except KeyError as error:
+            raise RecordingError(file, f"damaged: its metadata has no names of {error}") from None
+        if len(layout.joints) != len(layout.joint_units):
+            raise RecordingError(file, "damaged: its metadata has joints without a unit, or units without a joint")
+        return Provenance(**{**known, "layout": layout})  # type: ignore[arg-type]
+
+
+_Names = Annotated[list[str], FailFast()]
+_Count = Annotated[int, Field(ge=0, lt=1 << 53)]
+_Option = str | int | float | bool | None
+
+
+class _Written(TypedDict):
+    """A metadata record, value by value."""
+
+    scenario: str
+    root: str
+    frames: _Count
+    layout: dict[str, _Names]
+    model: dict[str, _Option | dict[str, _Option]]
+    files: dict[str, str]
+    code: str
+    version: str
+    libraries: dict[str, str]
+    block_frames: Annotated[int, Field(ge=1, lt=1 << 31)]
+    format: int
+    originals: dict[str, dict[str, str]]
+
+
+_WRITTEN = tuple(_Written.__annotations__)
 
 
 def sha256(data: bytes) -> str:
@@ -155,6 +184,6 @@ def _sources(folder: Traversable, prefix: str) -> list[tuple[str, bytes]]:
         if entry.is_dir():
             if entry.name != "__pycache__":
                 found += _sources(entry, f"{prefix}{entry.name}/")
-        elif entry.name.endswith(_SOURCES):
+        elif entry.name.endswith(".py"):
             found.append((prefix + entry.name, entry.read_bytes()))
     return found

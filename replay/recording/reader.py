@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +16,12 @@ from replay.logs.columns import Topic, read_topics
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
 from replay.numerics import transforms
+from replay.numerics.columns import Field
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import read_events
 from replay.recording.events import Events
 from replay.recording.provenance import RECORD, Provenance, sha256
-from replay.recording.topics import (
-    CAPACITIVE_FIELDS,
-    COLLISION_FIELDS,
-    DISTANCE_SCALARS,
-    DISTANCE_VECTORS,
-)
-from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.sensing.kinds import KINDS, of_kind
 from replay.simulation import Layout
 
 Floats = NDArray[np.float64]
@@ -34,17 +29,8 @@ Floats = NDArray[np.float64]
 FRAMES = "/joint_states"
 """The topic that is in every recording and tells its frames."""
 
-_DTYPES = {
-    "level": np.uint8,
-    "status": np.uint8,
-    "case": np.uint8,
-    "shape": np.int32,
-    "triangle": np.int32,
-    "evaluated": np.bool_,
-    "undecided": np.bool_,
-    "saturated": np.bool_,
-    "touching": np.bool_,
-}
+
+_NUMBER = Field()
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +48,8 @@ class Recording:
         joint_velocities: (F, J) [rad/s or m/s].
         link_poses: (F, L, 4, 4), T_world_link.
         link_quaternions: (F, L, 4), rotation of T_world_link, xyzw, w >= 0.
-        collision, distance, capacitive: see there; None when the scene does not ask for it.
+        collision: None when the scene tests no pair.
+        readings: columns of the sensors by kind, also by name as `recording.distance`, None when there are none.
         events: in the order of time, a sequence of `Event`.
         files: the scenario and every file that it needs, by name.
         loss: what a salvaged file has lost, else None.
@@ -77,12 +64,14 @@ class Recording:
     link_poses: Floats
     link_quaternions: Floats
     collision: CollisionColumns | None
-    distance: DistanceColumns | None
-    capacitive: CapacitiveColumns | None
     events: Events
     files: Mapping[str, bytes]
     loss: Loss | None
     lost_frames: int
+    readings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getattr__(self, kind: str) -> Any:
+        return of_kind(self, kind, "readings")
 
     @property
     def layout(self) -> Layout:
@@ -152,8 +141,7 @@ def read_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
 
 def own_topics(layout: Layout) -> set[str]:
     """Return the topics that a recording may have; those that another tool has added to it are none of them."""
-    sensors = [("/distance", layout.distance_sensors), ("/capacitive", layout.capacitive_sensors)]
-    return {FRAMES, "/tf", "/scene", EVENTS, "/collision"} | {f"{group}/{n}" for group, names in sensors for n in names}
+    return {FRAMES, "/tf", "/scene", EVENTS, "/collision", *layout.topics()}
 
 
 class _Assembly:
@@ -203,8 +191,7 @@ class _Assembly:
             link_poses=poses,
             link_quaternions=quaternions,
             collision=self._collision(),
-            distance=self._distance(),
-            capacitive=self._capacitive(),
+            readings=self._readings(),
             events=self._events(),
             files=read_files(self._log, self._provenance),
             loss=self._log.loss,
@@ -214,9 +201,9 @@ class _Assembly:
     def _check_topics(self, names: set[str]) -> None:
         """Refuse a file without the topics that every recording has, or with some sensors of a kind and not all."""
         needed = {FRAMES, "/tf", EVENTS}
-        for group in ("distance", "capacitive"):
-            sensors = {f"/{group}/{name}" for name in getattr(self._provenance.layout, f"{group}_sensors")}
-            needed |= sensors if sensors & names else set()
+        for kind, sensors in self._provenance.layout.sensors.items():
+            topics = {KINDS[kind].topic(name) for name in sensors}
+            needed |= topics if topics & names else set()
         missing = ", ".join(map(repr, sorted(needed - names)))
         if missing:
             raise RecordingError(self._file, f"damaged: topics are missing: {missing}")
@@ -246,15 +233,36 @@ class _Assembly:
             raise RecordingError(self._file, f"damaged: topic {name!r} is missing")
         return self._topics[name]
 
-    def _column(self, topic: Topic, path: str, count: int | None = None) -> NDArray[Any]:
-        """Take a field of all frames out of a topic, (F,) or, with `count`, (F, count); so memory holds it once."""
+    def _column(self, topic: Topic, path: str, field: Field = _NUMBER, count: int | None = None) -> NDArray[Any]:
+        """Take a value of all frames out of a topic, (F,) or, with `count`, (F, count); so memory holds it once."""
         frames = len(self._frames)
         column = topic.columns.pop(path, None)
         if column is None and (count == 0 or not len(topic.time)) and topic.messages is None:
-            column = np.zeros((len(topic.time), *(() if count is None else (count,))))
+            column = np.zeros((len(topic.time), *(() if count is None else (count,))), field.type)
         if column is None or column.shape[1:] != (() if count is None else (count,)):
             raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is missing or misshapen")
-        return column[:frames].astype(_DTYPES.get(path, np.float64), copy=False)
+        least, most = self._range(field)
+        if column.dtype.kind not in {"f": "f", "b": "b"}.get(field.type.kind, "iu"):
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is of another type")
+        column = column[:frames]
+        if field.type.kind != "f" and column.size and not (column.min() >= least and column.max() <= most):
+            wrong = int(column.min() if column.min() < least else column.max())
+            rule = f"{wrong}, which is none of {least} to {most}"
+            raise RecordingError(self._file, f"damaged: field {path!r} of topic {topic.name!r} is {rule}")
+        return column.astype(field.type, copy=False)
+
+    def _range(self, field: Field) -> tuple[int, int]:
+        """Return the least and the largest value of a field that counts or names something."""
+        if field.names:
+            return -1, len(getattr(self._layout, field.names)) - 1
+        return (-1 if field.type.kind == "i" else 0), field.most
+
+    def _field(self, topic: Topic, field: Field) -> NDArray[Any]:
+        """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n)."""
+        if field.letters:
+            return np.stack([self._column(topic, f"{field.name}.{c}", field) for c in field.letters], axis=1)
+        count = len(getattr(self._layout, field.each)) if field.each else None
+        return self._column(topic, field.name, field, count)
 
     def _check_names(self, topic: Topic, path: str, names: tuple[str, ...]) -> None:
         if any(topic.texts.get(path.format(index)) != name for index, name in enumerate(names)) and len(self._frames):
@@ -266,38 +274,18 @@ class _Assembly:
         if "/collision" not in self._topics:
             return None
         topic = self._topic("/collision")
-        return CollisionColumns(**{f: self._column(topic, f, len(self._layout.pairs)) for f in COLLISION_FIELDS})
+        return CollisionColumns(**{field.name: self._field(topic, field) for field in CollisionColumns.fields()})
 
-    def _distance(self) -> DistanceColumns | None:
-        present = self._sensors("/distance", self._layout.distance_sensors)
-        if not present:
-            return None
-        columns: dict[str, Any] = {
-            field: _stack([self._column(topic, field) for topic in present], len(self._frames))
-            for field in DISTANCE_SCALARS
-        }
-        for field in DISTANCE_VECTORS:
-            vectors = [[self._column(topic, f"{field}.{letter}") for letter in "xyz"] for topic in present]
-            columns[field] = np.stack([np.stack(parts, axis=1) for parts in vectors], axis=1)
-        return DistanceColumns(**columns)
-
-    def _capacitive(self) -> CapacitiveColumns | None:
-        present = self._sensors("/capacitive", self._layout.capacitive_sensors)
-        if not present:
-            return None
-        columns = {
-            field: np.stack(
-                [self._column(t, field, len(self._layout.objects) if field == "per_object" else None) for t in present],
-                axis=1,
-            )
-            for field in CAPACITIVE_FIELDS
-        }
-        return CapacitiveColumns(**columns)
-
-    def _sensors(self, group: str, sensors: tuple[str, ...]) -> list[Topic]:
-        """Return the topics of a group's sensors, empty when the recording has none of them."""
-        names = [f"{group}/{sensor}" for sensor in sensors]
-        return [self._topics[name] for name in names if name in self._topics]
+    def _readings(self) -> dict[str, Any]:
+        found = {}
+        for kind, names in self._layout.sensors.items():
+            topics = [self._topics[topic] for topic in map(KINDS[kind].topic, names) if topic in self._topics]
+            columns = KINDS[kind].columns
+            if topics:
+                found[kind] = columns(
+                    **{f.name: np.stack([self._field(t, f) for t in topics], axis=1) for f in columns.fields()}
+                )
+        return found
 
     def _events(self) -> Events:
         if not self._with_events:
@@ -316,8 +304,10 @@ def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
         joints=layout.joints if joints else (),
         joint_units=layout.joint_units if joints else (),
         pairs=layout.pairs if "/collision" in topics else (),
-        distance_sensors=tuple(name for name in layout.distance_sensors if f"/distance/{name}" in topics),
-        capacitive_sensors=tuple(name for name in layout.capacitive_sensors if f"/capacitive/{name}" in topics),
+        sensors={
+            kind: tuple(name for name in names if KINDS[kind].topic(name) in topics)
+            for kind, names in layout.sensors.items()
+        },
     )
 
 

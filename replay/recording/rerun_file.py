@@ -3,6 +3,10 @@
 The library's own writing thread stops at the first error, such as a full disk, and whoever then flushes or closes the
 stream waits for ever. So the library writes into a pipe, which never fails, and the bytes are written to the file here,
 where an error is an error. (Windows has no such pipe: there the library writes the file.)
+
+The library keeps every recording of a process, with four threads each, until it is told to look for those that nobody
+holds any more, and a blueprint that was sent holds itself. Both are seen to here, or a night would grow by 1.4 MiB with
+each recording.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ import contextlib
 import os
 import sys
 import threading
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +27,10 @@ _FLUSH = 60.0  # [s] until what was sent must have been written
 _PIECE = 1 << 20  # bytes
 _LITTLE = 1 << 15  # bytes; a pipe holds more, so that the library need not wait when there are fewer
 _PAUSE = 0.005  # [s] after little, lest every chunk wakes a thread that takes the interpreter from the others
+
+_opening = threading.Lock()
+_unfinished: weakref.WeakSet[RerunFile] = weakref.WeakSet()
+"""Recordings that this process writes now."""
 
 
 class RerunFile:
@@ -47,19 +56,29 @@ class RerunFile:
         self._closing: threading.Thread | None = None
         self._ending = threading.Event()
 
-    def open(self, application: str, **options: Any) -> Any:
-        """Open the stream and return it; `options` are those of rerun.RecordingStream.save."""
+    def open(self, application: str) -> Any:
+        """Open the stream and return it."""
         import rerun as rr
 
-        self.stream = rr.RecordingStream(application)
+        with _opening:
+            if not _unfinished:  # the library waits for those, holding what this thread would need to write them
+                _give_back()
+            _unfinished.add(self)
+            self.stream = rr.RecordingStream(application)
         try:
             if sys.platform == "win32":
-                self.stream.save(self._file.part, **options)
+                self.stream.save(self._file.part)
             else:
-                self._open_pipe(options)
+                self._open_pipe()
         except (OSError, RuntimeError) as error:
             raise WriteError(str(self.path), str(error)) from None
         return self.stream
+
+    def arrange(self, blueprint: Any) -> None:
+        """Say how the viewer arranges the recording; `blueprint` is as of rerun.RecordingStream.send_blueprint."""
+        noted = _Noted(blueprint)
+        self.stream.send_blueprint(noted)
+        noted.stream.disconnect()
 
     def flush(self) -> None:
         """Wait until everything that was sent is written; WriteError when that fails."""
@@ -92,13 +111,13 @@ class RerunFile:
         if self._closing is not None:
             self._closing.join()
 
-    def _open_pipe(self, options: dict[str, Any]) -> None:
+    def _open_pipe(self) -> None:
         source, sink = os.pipe()
         _widen(sink)
         self._thread = threading.Thread(target=self._copy, args=(source,), name="replay-rrd", daemon=True)
         self._thread.start()
         try:
-            self.stream.save(f"/dev/fd/{sink}", **options)
+            self.stream.save(f"/dev/fd/{sink}")
         finally:
             os.close(sink)  # the library has an end of its own; when that is closed, so is the pipe
 
@@ -117,6 +136,7 @@ class RerunFile:
             self._thread.join()
         if self._error is None:
             self._guard(self._file.finish)
+        _unfinished.discard(self)
 
     def _guard(self, task: Callable[..., None], *arguments: bytes) -> None:
         """Run a task and keep the first error: nobody waits for this thread until the end."""
@@ -128,6 +148,31 @@ class RerunFile:
     def _check(self) -> None:
         if self._error is not None:
             raise self._error
+
+
+class _Noted:
+    """A blueprint that knows which stream the library makes for it: until that is disconnected it holds itself."""
+
+    def __init__(self, blueprint: Any) -> None:
+        self._blueprint = blueprint
+        self.stream: Any = None
+
+    def to_blueprint(self) -> _Noted:
+        """Return this."""
+        return self
+
+    def _log_to_stream(self, stream: Any) -> None:
+        self.stream = stream
+        self._blueprint.to_blueprint()._log_to_stream(stream)
+
+
+def _give_back() -> None:
+    """Let the library give back what it keeps of recordings that nobody holds: it does so when it is begun anew."""
+    import rerun as rr
+
+    if rr.get_global_data_recording() is None:  # a caller's own recording would be taken away
+        with contextlib.suppress(RuntimeError):  # one of a caller's own cannot be written; ours will say so themselves
+            rr.init("replay", init_logging=False)
 
 
 def _widen(pipe: int) -> None:

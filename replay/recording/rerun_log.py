@@ -20,9 +20,8 @@ from replay.recording.blueprint_parts import RecordingBlueprint
 from replay.recording.events import EventFinder
 from replay.recording.rerun_columns import Chunks, Column, Index, column, entity, index_of, packed
 from replay.recording.rerun_file import RerunFile
-from replay.recording.rerun_scene import body_path, extent, log_curve, log_scene
+from replay.recording.rerun_scene import beam_path, body_path, extent, log_curve, log_scene
 from replay.recording.scene_view import SceneView
-from replay.sensing.columns import Detection
 from replay.simulation import FrameBlock, Layout
 
 Flags = NDArray[np.bool_]
@@ -78,8 +77,13 @@ class RerunWriter:
         self._indexes.clear()
         self._poses(block)
         self._colors(block)
-        self._distance(block)
-        self._capacitive(block)
+        for kind, columns in block.readings.items():
+            for chart, field in blueprint.CHARTED[kind].items():
+                values = getattr(columns, field.name)
+                self._curves(block, chart, self._layout.sensors[kind], values, np.isfinite(values))
+            for field in columns.fields():
+                if field.beam:
+                    self._beams(block, kind, getattr(columns, field.name))
         self._clearance(block)
         titles = [f"{name} [{unit}]" for name, unit in zip(self._layout.joints, self._layout.joint_units, strict=True)]
         everywhere = np.ones(block.joint_positions.shape, dtype=np.bool_)
@@ -94,7 +98,7 @@ class RerunWriter:
         """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
             layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
-            self._stream.send_blueprint(layout, make_active=False)
+            self._file.arrange(layout)
             self._stream = None
             self._file.finish()
 
@@ -162,33 +166,27 @@ class RerunWriter:
                 colors = column("Mesh3D", "albedo_factor", palette[level[rows]], 1)
                 self._send(block, rows, body_path(self._scene, self._scene.bodies[k]), colors)
 
-    def _distance(self, block: FrameBlock) -> None:
-        if block.distance is None:
-            return
-        names, seen = self._layout.distance_sensors, block.distance.status != Detection.NOTHING
-        self._curves(block, blueprint.DISTANCE, names, block.distance.distance, seen)
-        cones = {cone.sensor: cone for cone in self._scene.cones}
-        shown = [sensor for sensor, name in enumerate(names) if name in cones]
+    def _beams(self, block: FrameBlock, kind: str, points: Floats) -> None:
+        """Draw lines from the sensors of a kind to the points (n, S, 3) that they read; NaN is none."""
+        drawn = {sensor.name: sensor for sensor in self._scene.sensors if sensor.kind == kind}
+        names = self._layout.sensors[kind]
+        shown = [sensor for sensor, name in enumerate(names) if name in drawn]
         if not shown:
             return
-        placed = [cones[names[sensor]] for sensor in shown]
-        origins = np.stack([cone.T_link_sensor[:3, 3] for cone in placed])
-        apexes = transforms.apply(block.link_poses[:, [cone.link for cone in placed]], origins)
-        ends = np.stack([apexes, block.distance.point[:, shown]], axis=2)
-        changed = self._changed("beams", np.where(seen[:, shown, None, None], ends, 0.0))
+        placed = [drawn[names[sensor]] for sensor in shown]
+        origins = np.stack([sensor.drawing.extent[0] for sensor in placed])
+        begins = transforms.apply(block.link_poses[:, [sensor.link for sensor in placed]], origins)
+        ends = np.stack([begins, points[:, shown]], axis=2)
+        seen = np.asarray(np.isfinite(points[:, shown]).all(axis=2))
+        changed = self._changed(f"beams {kind}", np.where(seen[:, :, None, None], ends, 0.0))
         for place, sensor in enumerate(shown):
             rows = changed[:, place]
             if rows.any():
-                drawn = ends[rows & seen[:, sensor], place]
-                lengths = seen[rows, sensor].astype(np.int64)  # no strip at all while nothing is seen
-                strips = column("LineStrips3D", "strips", drawn, lengths, 2)
-                points = column("Points3D", "positions", drawn[:, 1], lengths)
-                self._send(block, rows, entity(blueprint.SCENE, "closest_points", names[sensor]), strips, points)
-
-    def _capacitive(self, block: FrameBlock) -> None:
-        if block.capacitive is not None:
-            values = block.capacitive.delta_output
-            self._curves(block, blueprint.CAPACITIVE, self._layout.capacitive_sensors, values, np.isfinite(values))
+                lines = ends[rows & seen[:, place], place]
+                lengths = seen[rows, place].astype(np.int64)  # no strip at all while nothing is seen
+                strips = column("LineStrips3D", "strips", lines, lengths, 2)
+                tips = column("Points3D", "positions", lines[:, 1], lengths)
+                self._send(block, rows, beam_path(names[sensor]), strips, tips)
 
     def _clearance(self, block: FrameBlock) -> None:
         if block.collision is not None:

@@ -1,4 +1,4 @@
-"""The parts of a rerun recording that do not change: bodies, cones, plates, names of curves, the scenario's text."""
+"""The parts of a rerun recording that do not change: bodies, sensors, names of curves, the scenario's text."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from replay.numerics import transforms
 from replay.recording import blueprint
 from replay.recording.rerun_columns import Chunks, Column, column, constants, entity, packed, row
-from replay.recording.scene_view import BodyView, Color, Floats, SceneView
-from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
+from replay.recording.scene_view import BodyView, Floats, SceneView
+from replay.recording.surfaces import corner_normals
+from replay.sensing.kind import Color, Outline
+from replay.sensing.kinds import KINDS
 
-CONE = (110, 190, 255, 140)
-PLATE = (216, 140, 60, 255)
 BEAM = (255, 235, 90, 255)
 CURVES = (
     (86, 180, 233),
@@ -37,15 +37,22 @@ def body_path(scene: SceneView, body: BodyView) -> str:
     return entity(blueprint.SCENE, scene.links[body.link], body.name.rpartition("/")[2])
 
 
+def beam_path(sensor: str) -> str:
+    """Return the entity of the line from a sensor to the point that it reads."""
+    return entity(blueprint.SCENE, "closest_points", sensor)
+
+
 def log_scene(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> None:
     """Log everything that does not change; the colours of the bodies in `colored` do."""
     chunks.add(blueprint.SCENE, {}, _axes())
     _log_bodies(chunks, scene, colored)
-    for cone in scene.cones:
-        lines = _lines(cone_strips(cone), CONE, 0.8)
-        chunks.add(entity(blueprint.SCENE, scene.links[cone.link], "distance_sensors", cone.sensor), {}, lines)
-        chunks.add(entity(blueprint.SCENE, "closest_points", cone.sensor), {}, _beam())
-    _log_plates(chunks, scene)
+    for sensor in scene.sensors:
+        path = [blueprint.SCENE, scene.links[sensor.link], f"{sensor.kind}_sensors", sensor.name]
+        for part in sensor.drawing.outlines:
+            chunks.add(entity(*path, *([part.name] if part.name else [])), {}, _outline(part))
+        for field in KINDS[sensor.kind].columns.fields():
+            if field.beam:
+                chunks.add(beam_path(sensor.name), {}, _beam())
     text = row("TextDocument", "text", [_document(scene)])
     chunks.add(blueprint.SCENARIO, {}, [text, row("TextDocument", "media_type", ["text/markdown"])])
 
@@ -59,16 +66,13 @@ def _log_bodies(chunks: Chunks, scene: SceneView, colored: Collection[int]) -> N
         chunks.add(body_path(scene, body), {}, _mesh(corners[begin:end], normals[begin:end], color))
 
 
-def _log_plates(chunks: Chunks, scene: SceneView) -> None:
-    outlines: dict[tuple[str, ...], list[Floats]] = {}
-    for plate in scene.plates:
-        path = [blueprint.SCENE, scene.links[plate.link], "capacitive_sensors", plate.sensor, plate.name]
-        four = plate_corners(plate)
-        across = np.broadcast_to(plate.T_link_plate[:3, 2], (6, 3))
-        chunks.add(entity(*path), {}, _mesh(four[[0, 1, 2, 0, 2, 3]], across, PLATE))
-        outlines.setdefault((*path[:-1], "outline"), []).append(four[[0, 1, 2, 3, 0]])
-    for place, strips in outlines.items():
-        chunks.add(entity(*place), {}, _lines(strips, PLATE, 1.0))
+def _outline(part: Outline) -> list[Column]:
+    if part.face is None:
+        return _lines(part.strips, part.color, part.width)
+    a, b, c, d = part.face
+    across = np.cross(b - a, d - a)
+    normals = np.broadcast_to(across / np.linalg.norm(across), (6, 3))
+    return _mesh(np.stack([a, b, c, a, c, d]), normals, part.color)
 
 
 def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:
@@ -84,8 +88,7 @@ def extent(scene: SceneView, link_poses: Floats) -> Floats:
         scene: what is shown; flat bodies (a floor) count only when there are no others.
         link_poses: (F, L, 4, 4), T_world_link; at most 17 of the frames are looked at, evenly spread.
     """
-    spans = [(cone.link, cone.T_link_sensor[:3, 3][None]) for cone in scene.cones]
-    spans += [(plate.link, plate_corners(plate)) for plate in scene.plates]
+    spans = [(sensor.link, sensor.drawing.extent) for sensor in scene.sensors]
     counts = np.diff(scene.meshes.first_vertex)
     bodies = [body for body, count in zip(scene.bodies, counts.tolist(), strict=True) if count]
     if bodies:

@@ -1,4 +1,4 @@
-"""What a recording shows of a scene: bodies, sensing cones and plates, each on its link."""
+"""What a recording shows of a scene: bodies and sensors, each on its link."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.sensing.kind import Color, Drawing
+from replay.sensing.kinds import KINDS
+
 if TYPE_CHECKING:
     from replay.scenario.scene import Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Color = tuple[int, int, int, int]
-"""Red, green, blue and opacity, 0 to 255."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,41 +38,19 @@ class BodyView:
 
 
 @dataclass(frozen=True, eq=False)
-class ConeView:
-    """The cone of a distance sensor: apex at the sensor's origin, axis +z.
+class SensorView:
+    """A sensor as it is drawn.
 
     Attributes:
-        sensor: name.
+        kind, name: which one.
         link: index of its link.
-        T_link_sensor: (4, 4).
-        aperture: full opening angle [rad].
-        range: [m], may be infinite.
+        drawing: in its link's frame.
     """
 
-    sensor: str
-    link: int
-    T_link_sensor: Floats
-    aperture: float
-    range: float
-
-
-@dataclass(frozen=True, eq=False)
-class PlateView:
-    """A plate of a capacitive sensor, in the xy plane of its own frame.
-
-    Attributes:
-        sensor: name of the sensor.
-        name: of the plate among the sensor's plates.
-        link: index of its link.
-        T_link_plate: (4, 4).
-        half_size: (2,) half edges [m] along x and y.
-    """
-
-    sensor: str
+    kind: str
     name: str
     link: int
-    T_link_plate: Floats
-    half_size: Floats
+    drawing: Drawing
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +61,14 @@ class SceneView:
         name, description: of the scenario; the description may be several lines of Markdown.
         texts: the scenario's own text files, by name.
         links: L names.
-        bodies, cones, plates: see there.
+        bodies, sensors: see there.
     """
 
     name: str
     description: str
     links: tuple[str, ...]
     bodies: tuple[BodyView, ...]
-    cones: tuple[ConeView, ...] = ()
-    plates: tuple[PlateView, ...] = ()
+    sensors: tuple[SensorView, ...] = ()
     texts: Mapping[str, str] = field(default_factory=dict)
 
     @functools.cached_property
@@ -152,11 +130,10 @@ def view(scene: Scene) -> SceneView:
         description="\n\n".join(part for part in (scenario.description, notes) if part),
         links=scene.layout.links,
         bodies=tuple(BodyView(s.name, s.link, s.solid.triangles, s.color) for s in scene.shapes),
-        cones=tuple(ConeView(s.name, s.link, s.T_link_sensor, s.aperture, s.range) for s in scene.distance_sensors),
-        plates=tuple(
-            PlateView(sensor.name, plate.name, sensor.link, plate.T_link_plate, plate.half_size)
-            for sensor in scene.capacitive_sensors
-            for plate in sensor.plates
+        sensors=tuple(
+            SensorView(kind, sensor.name, sensor.link, KINDS[kind].drawing(sensor))
+            for kind, sensors in scene.sensors.items()
+            for sensor in sensors
         ),
         texts={
             name: data.decode(errors="replace")

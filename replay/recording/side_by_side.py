@@ -16,7 +16,6 @@ from replay.recording import blueprint
 from replay.recording.rerun_file import RerunFile
 from replay.recording.scene_view import Floats
 
-_CHARTS = (blueprint.DISTANCE, blueprint.CAPACITIVE, blueprint.CLEARANCE, blueprint.JOINTS)
 _EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
 _SOMEWHERE = np.array([3.0, -4.0, 3.0]), np.zeros(3)  # where recordings that are not ours are looked at from
 
@@ -75,7 +74,7 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
                 for chunk in reader.stream():
                     _copy(stream, chunk, side, found)
         eye = blueprint.eye_of_all(found.eyes or [_SOMEWHERE])
-        stream.send_blueprint(blueprint.side_by_side(sides, sorted(found.charts), eye, found.end), make_active=False)
+        result.arrange(blueprint.side_by_side(sides, sorted(found.charts), eye, found.end))
         result.commit()
     except BaseException:
         result.discard()
@@ -127,7 +126,7 @@ def _copy(stream: Any, chunk: Any, side: str, found: _Found) -> None:
     batch = chunk.to_record_batch()
     stream.send_chunks(chunk.with_entity_path(f"{rr.new_entity_path([side])}{path}"))
     top = path.split("/")[1]
-    if top in _CHARTS:
+    if top in blueprint.CHARTS:
         found.charts.add(top)
     if blueprint.TIMELINE in chunk.timeline_names and len(batch):
         times = batch.column(blueprint.TIMELINE).cast("int64").to_numpy(zero_copy_only=False)

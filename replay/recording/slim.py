@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from replay.errors import RecordingError
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.logs.mcap_chunks import records, unpack
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Chunk, Op
@@ -137,7 +137,7 @@ def _copy(log: McapLog, chunk: Chunk, writer: McapFileWriter, channels: Mapping[
     data = unpack(str(log.path), chunk, packed)
     found: dict[int, list[tuple[int, int, int, int]]] = {}
     only_messages = True
-    for op, begin, end in records(str(log.path), data):
+    for op, begin, end in records(str(log.path), data, log.most_records):
         if op == Op.MESSAGE and end - begin >= MESSAGE_HEAD:
             channel, sequence, time = struct.unpack_from("<HIQ", data, begin)
             found.setdefault(channel, []).append((begin, end, sequence, time))

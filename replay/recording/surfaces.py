@@ -1,18 +1,14 @@
-"""Triangles made ready for drawing: corner normals, cones and plates."""
+"""Triangles made ready for drawing: a normal for each corner."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from replay.numerics import transforms
-from replay.recording.scene_view import ConeView, Floats, Meshes, PlateView
+from replay.recording.scene_view import Floats, Meshes
 
 _CREASE = 0.8
 """Cosine of the angle between two faces below which the edge between them is drawn sharp."""
 _MOST_NEIGHBOURS = 64  # faces at one vertex that are looked at together; the apex of a fine cone may have more
-_CONE_SEGMENTS = 24
-_ENDLESS_CONE = 2.0
-"""Length [m] that a cone without a range is drawn with."""
 
 
 def corner_normals(meshes: Meshes) -> Floats:
@@ -44,27 +40,6 @@ def _cross(a: Floats, b: Floats) -> Floats:
     x, y, z = a.T
     u, v, w = b.T
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-
-
-def cone_strips(cone: ConeView) -> list[Floats]:
-    """Return the line strips (k, 3) [m], in the link's frame, that outline a sensing cone and the end of its range."""
-    length = cone.range if np.isfinite(cone.range) else _ENDLESS_CONE
-    half = min(0.5 * cone.aperture, 0.49 * np.pi)
-    turn = np.linspace(0.0, 2.0 * np.pi, _CONE_SEGMENTS + 1)
-    ring = np.stack(
-        [np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half))], axis=1
-    )
-    corners = transforms.apply(cone.T_link_sensor, np.concatenate([np.zeros((1, 3)), length * ring]))
-    apex, rim = corners[0], corners[1:]
-    sides = [np.stack([apex, rim[k]]) for k in range(0, _CONE_SEGMENTS, _CONE_SEGMENTS // 8)]
-    return [*sides, rim] if np.isfinite(cone.range) else sides
-
-
-def plate_corners(plate: PlateView) -> Floats:
-    """Return the corners (4, 3) [m] of a plate in the link's frame, in order around it."""
-    x, y = plate.half_size
-    corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-    return transforms.apply(plate.T_link_plate, corners)
 
 
 def _unit(vectors: Floats) -> Floats:

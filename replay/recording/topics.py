@@ -7,15 +7,19 @@ library with a value other than zero in every field, and then filled for whole b
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
+from replay.collision.columns import CollisionColumns
 from replay.logs.mcap_writer import MessageRows
 from replay.logs.wire import MessageShape, Slot, shape_of
+from replay.numerics.columns import Field, components
 from replay.recording import messages
+from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
 
 Column = NDArray[Any]
@@ -23,10 +27,6 @@ Columns = dict[str, Column]
 
 WORLD = "world"
 """The coordinate frame that every link's transform starts from."""
-COLLISION_FIELDS = ("level", "clearance", "evaluated", "undecided")
-DISTANCE_SCALARS = ("status", "distance", "shape", "triangle", "case")
-DISTANCE_VECTORS = ("point", "point_sensor", "normal")
-CAPACITIVE_FIELDS = ("capacitance", "output_voltage", "delta_output", "saturated", "touching", "per_object")
 
 _SECOND = 1_000_000_000
 _WIDE_SECONDS = 1 << 34  # an example time stamp whose varints have five bytes: room for 2^35 s
@@ -67,25 +67,38 @@ class FrameTopic:
         return rows
 
 
-def frame_topics(layout: Layout, *, collision: bool, distance: bool, capacitive: bool) -> Iterator[FrameTopic]:
+def frame_topics(layout: Layout, *, collision: bool, kinds: Collection[str]) -> Iterator[FrameTopic]:
     """Yield the topics of a recording that have a message in every frame, `/joint_states` last.
 
     The last one marks a block as complete for those who salvage a cut file.
+
+    Args:
+        layout: the names behind the columns.
+        collision: whether there are results of pairs.
+        kinds: of sensors of which there are readings.
     """
     yield _topic("/tf", messages.TRANSFORMS, _transforms_example(layout), _transforms(layout))
     if collision:
-        pairs = len(layout.pairs)
-        example = {"level": [1] * pairs, "clearance": [1.0] * pairs, "evaluated": [True] * pairs}
-        yield _topic("/collision", messages.COLLISION, {**example, "undecided": [True] * pairs}, _collision)
-    for index, name in enumerate(layout.distance_sensors if distance else ()):
-        vectors = {field: {"x": 1.0, "y": 1.0, "z": 1.0} for field in DISTANCE_VECTORS}
-        scalars = {"status": 1, "distance": 1.0, "shape": 1, "triangle": 1, "case": 1}
-        yield _topic(f"/distance/{name}", messages.DISTANCE, {**scalars, **vectors}, _distance(index))
-    for index, name in enumerate(layout.capacitive_sensors if capacitive else ()):
-        flags = {"saturated": True, "touching": True, "per_object": [1.0] * len(layout.objects)}
-        volts = {"capacitance": 1.0, "output_voltage": 1.0, "delta_output": 1.0}
-        yield _topic(f"/capacitive/{name}", messages.CAPACITIVE, {**volts, **flags}, _capacitive(index))
+        example = _example(CollisionColumns.fields(), layout)
+        yield _topic("/collision", messages.COLLISION, example, _collision)
+    for kind in KINDS.values():
+        if kind.name in kinds:
+            example = _example(kind.columns.fields(), layout)
+            for index, name in enumerate(layout.sensors[kind.name]):
+                yield _topic(kind.topic(name), kind.message, example, _reading(kind.name, index))
     yield _topic("/joint_states", messages.JOINTS, _joints_example(layout), _joints)
+
+
+def _example(fields: Collection[Field], layout: Layout) -> dict[str, Any]:
+    """Return a message's values, none of them 0."""
+    return {field.name: _ones(field, layout) for field in fields}
+
+
+def _ones(field: Field, layout: Layout) -> Any:
+    one = np.ones(1, dtype=field.type).tolist()
+    if field.letters:
+        return dict.fromkeys(field.letters, one[0])
+    return one * len(getattr(layout, field.each)) if field.each else one[0]
 
 
 def _topic(name: str, type_: str, example: Mapping[str, Any], columns: Callable[[FrameBlock], Columns]) -> FrameTopic:
@@ -148,24 +161,16 @@ def _transforms(layout: Layout) -> Callable[[FrameBlock], Columns]:
 
 def _collision(block: FrameBlock) -> Columns:
     assert block.collision is not None
-    return {field: getattr(block.collision, field) for field in COLLISION_FIELDS}
+    return {field.name: getattr(block.collision, field.name) for field in block.collision.fields()}
 
 
-def _distance(sensor: int) -> Callable[[FrameBlock], Columns]:
+def _reading(kind: str, sensor: int) -> Callable[[FrameBlock], Columns]:
+    fields = KINDS[kind].columns.fields()
+
     def columns(block: FrameBlock) -> Columns:
-        assert block.distance is not None
-        result = {field: getattr(block.distance, field)[:, sensor] for field in DISTANCE_SCALARS}
-        for field in DISTANCE_VECTORS:
-            values = getattr(block.distance, field)[:, sensor]
-            result |= {f"{field}.{letter}": values[:, axis] for axis, letter in enumerate("xyz")}
-        return result
-
-    return columns
-
-
-def _capacitive(sensor: int) -> Callable[[FrameBlock], Columns]:
-    def columns(block: FrameBlock) -> Columns:
-        assert block.capacitive is not None
-        return {field: getattr(block.capacitive, field)[:, sensor] for field in CAPACITIVE_FIELDS}
+        found: Columns = {}
+        for field in fields:
+            found |= components(field, getattr(block.readings[kind], field.name)[:, sensor])
+        return found
 
     return columns

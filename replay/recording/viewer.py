@@ -1,18 +1,13 @@
-"""The rerun viewer in a window or in a browser; it never outlives the command that opened it."""
+"""The rerun viewer in a window; it never outlives the command that opened it."""
 
 from __future__ import annotations
 
-import contextlib
-import socket
-import subprocess
-import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from replay.errors import ViewerError
-from replay.logs.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
-from replay.recording.picture import end, viewer_binary
+from replay.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
+from replay.recording.viewer_process import LOOPBACK, free_port, quarters, running, viewer_binary
 
 
 def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
@@ -37,39 +32,18 @@ def rerun_files(recordings: Sequence[str | Path]) -> list[Path]:
     return files
 
 
-def show(file: Path, *, web: bool = False) -> None:
-    """Open a recording in a viewer and wait until it is closed.
+def show(file: Path) -> None:
+    """Open a recording in a window of its own and wait until it is closed; see `web_page.serve` for a browser.
 
     Args:
         file: an `.rrd` file.
-        web: serve the viewer to browsers on this machine (127.0.0.1 only) until interrupted.
 
     Raises:
         ViewerError: the viewer is not installed or fails, as it does without a display.
     """
-    command = [str(viewer_binary()), str(file), "--bind", "127.0.0.1"]  # the window takes data from others too
-    if web:
-        command += ["--web-viewer", "--web-viewer-port", str(free_port(9090)), "--port", str(free_port(9876))]
-    begun: list[subprocess.Popen[bytes]] = []
-    try:
-        with ThreadPoolExecutor(1) as starter:  # no signal interrupts a thread: a viewer that has begun is known here
-            starter.submit(int).result()  # the thread is there
-            starter.submit(lambda: begun.append(subprocess.Popen(command))).result()
-        code = begun[0].wait()
-    finally:
-        for process in begun:
-            end(process)
+    command = [str(viewer_binary()), str(file.resolve()), "--hide-welcome-screen"]
+    command += ["--bind", LOOPBACK, "--port", str(free_port())]  # it takes data from others; another viewer is not ours
+    with quarters() as where, running(command, where) as process:
+        code = process.wait()
     if code != 0:
-        hint = "" if web else "; without a display use --web or --screenshot"
-        raise ViewerError(f"the rerun viewer failed with code {code}{hint}")
-
-
-def free_port(usual: int) -> int:
-    """Return a port of 127.0.0.1 that nobody listens on: the usual one, unless another viewer has it."""
-    for port in (usual, 0):
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            if sys.platform != "win32":  # a port whose viewer has just ended is free; Windows means another thing by it
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(("127.0.0.1", port))
-            return int(probe.getsockname()[1])
-    raise ViewerError("no port of 127.0.0.1 is free for the viewer")
+        raise ViewerError(f"the rerun viewer failed with code {code}; without a display use --web or --screenshot")

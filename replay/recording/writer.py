@@ -80,12 +80,8 @@ class McapWriter:
             self._log.attachment(name, _MEDIA_TYPES.get(ending, "application/octet-stream"), data)
         self._scene_data = scene_message(self._scene)
         layout = self._provenance.layout
-        groups = {
-            "collision": layout.pairs,
-            "distance": layout.distance_sensors,
-            "capacitive": layout.capacitive_sensors,
-        }
-        list(frame_topics(layout, **{group: bool(names) for group, names in groups.items()}))  # shapes are found here
+        kinds = [kind for kind, names in layout.sensors.items() if names]
+        list(frame_topics(layout, collision=bool(layout.pairs), kinds=kinds))  # shapes are found here
 
     def write(self, block: FrameBlock) -> None:
         """Append a block; the first one decides which groups of columns the recording has."""
@@ -124,14 +120,8 @@ class McapWriter:
         self._file.discard()
 
     def _begin(self, log: McapFileWriter, block: FrameBlock) -> None:
-        topics = list(
-            frame_topics(
-                self._provenance.layout,
-                collision=block.collision is not None,
-                distance=block.distance is not None,
-                capacitive=block.capacitive is not None,
-            )
-        )
+        collision = block.collision is not None
+        topics = list(frame_topics(self._provenance.layout, collision=collision, kinds=block.readings))
         types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG})
         schemas = {name: log.schema(messages.schema(name)) for name in types}
         scene = log.channel("/scene", schemas[messages.SCENE])

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from replay.errors import CalibrationError, CurveError, InvalidValue
 from replay.kinematics.linkage import Joint
 from replay.kinematics.motion import sample
+from replay.language.units import ANGLE, CAPACITANCE, DIMENSION_OF, LENGTH, VOLTAGE, Dimension, quantity_rule
 from replay.logs.curve_csv import Column, Curve
 from replay.scenario.model import Scenario
 from replay.scenario.scene import build
-from replay.scenario.units import ANGLE, CAPACITANCE, DIMENSION_OF, LENGTH, VOLTAGE, Dimension, quantity_rule
 from replay.sensing.calibration import CONFIDENCE, QUANTITIES, Calibration, Quantity, calibrate
-from replay.sensing.capacitive import CapacitiveSuite
+from replay.sensing.capacitive.kind import Capacitive
 
 Floats = NDArray[np.float64]
 
@@ -60,13 +60,7 @@ class SensorPath:
         self._start = sample(scene.linkage, scene.script, np.zeros(1))
         unit = replace(self.sensor, permittivity=1.0, stray_capacitance=0.0)
         self.method = scene.model.identity()["capacitive"]
-        self._suite = CapacitiveSuite(
-            [unit],
-            scene.targets,
-            method=scene.model.capacitive.method,
-            rtol=scene.model.rtol,
-            splits=scene.model.splits,
-        )
+        self._suite = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
 
     def integral(self, positions: ArrayLike) -> Floats:
         """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated."""

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from replay.scenario.expectations import DistanceExpectation, PairExpectation
-from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
-from replay.scenario.problems import Path, did_you_mean
-from replay.scenario.units import (
+from replay.language.units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_ACCELERATION,
@@ -17,6 +14,10 @@ from replay.scenario.units import (
     Dimension,
     Dimensioned,
 )
+from replay.scenario.expectations import PairExpectation
+from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
+from replay.scenario.problems import Path, did_you_mean
+from replay.sensing.kinds import KINDS
 
 WORLD = "world"
 
@@ -155,7 +156,7 @@ def _has_limits(path: Path, joint: JointName) -> Iterator[Finding]:
 
 
 def _sensors(names: Names) -> Iterator[Finding]:
-    for kind, sensors in (("distance", names.distance), ("capacitive", names.capacitive)):
+    for kind, sensors in names.sensors.items():
         for name, sensor in sensors.items():
             if sensor is None:
                 continue
@@ -196,13 +197,10 @@ def _expectations(names: Names) -> Iterator[Finding]:
             yield from found or _tested(names, (*path, "pair"), expected.pair)
             if expected.clearance is not None:
                 yield from _clearance(names, (*path, "clearance", "min"), expected.clearance.min)
-        elif isinstance(expected, DistanceExpectation):
-            if expected.distance not in names.distance:
-                rule = did_you_mean(expected.distance, names.distance, what="distance sensors are")
-                yield (*path, "distance"), f"is no distance sensor; {rule}"
-        elif expected is not None and expected.capacitive not in names.capacitive:
-            rule = did_you_mean(expected.capacitive, names.capacitive, what="capacitive sensors are")
-            yield (*path, "capacitive"), f"is no capacitive sensor; {rule}"
+        for kind, sensors in names.sensors.items():
+            if isinstance(expected, KINDS[kind].expectation) and getattr(expected, kind) not in sensors:
+                rule = did_you_mean(getattr(expected, kind), sensors, what=f"{kind} sensors are")
+                yield (*path, kind), f"is no {kind} sensor; {rule}"
 
 
 def _tested(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, StringConstraints
 
-from replay.scenario.fields import Glob, Part, rejected
-from replay.scenario.units import Distance
+from replay.language.fields import Glob, Part, rejected
+from replay.language.units import Distance
 
 GlobPair = tuple[Glob, Glob]
 

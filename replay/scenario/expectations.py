@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Self, Union
 
 from pydantic import Discriminator, Tag, model_validator
 
+from replay.language.fields import Part, When, needs_one, rejected
+from replay.language.units import Distance, Time
 from replay.scenario.collision import GlobPair
-from replay.scenario.fields import Name, Part, rejected
-from replay.scenario.units import Distance, Time, Voltage
-
-When = Literal["never", "always", "sometimes"]
-"""In no frame, in every frame, in at least one."""
+from replay.sensing.kinds import KINDS
 
 
 class Between(Part):
@@ -58,80 +57,23 @@ class PairExpectation(Part):
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
-        _needs_one(self, "contact", "bounds", "clearance")
+        needs_one(self, "contact", "bounds", "clearance")
         return self
 
 
-class DistanceExpectation(Part):
-    """What a distance sensor reads."""
-
-    distance: Name
-    """Name of the distance sensor."""
-    min: Distance | None = None
-    """No reading is below this one [m]."""
-    max: Distance | None = None
-    """No reading is above this one [m]."""
-    detected: When | None = None
-    """Whether something is inside the cone and within range."""
-
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        _needs_one(self, "min", "max", "detected")
-        _ordered(self.min, self.max, "m")
-        return self
+PARTS = {"pair": PairExpectation, **{kind.name: kind.expectation for kind in KINDS.values()}}
+"""Expectations by the key that tells what they are about."""
 
 
-class OutputBounds(Part):
-    """Bounds of an output voltage."""
-
-    min: Voltage | None = None
-    """No output is below this one [V]."""
-    max: Voltage | None = None
-    """No output is above this one [V]."""
-
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        _needs_one(self, "min", "max")
-        _ordered(self.min, self.max, "V")
-        return self
+def _about(value: Any) -> str | None:
+    has = value.__contains__ if isinstance(value, dict) else partial(hasattr, value)
+    return next((f"about a {key}" for key in PARTS if has(key)), None)
 
 
-class CapacitiveExpectation(Part):
-    """What a capacitive sensor reads."""
-
-    capacitive: Name
-    """Name of the capacitive sensor."""
-    output: OutputBounds | None = None
-    """Bounds of the output voltage."""
-    saturated: When | None = None
-    """Whether the capacitance is infinite."""
-
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        _needs_one(self, "output", "saturated")
-        return self
-
-
-def _needs_one(part: Part, *keys: str) -> None:
-    if all(getattr(part, key) is None for key in keys):
-        raise rejected(f"expects nothing; add one of {', '.join(keys)}")
-
-
-def _ordered(low: float | None, high: float | None, unit: str) -> None:
-    if low is not None and high is not None and low > high:
-        raise rejected(f"must not be below min, {low:.6g} {unit}", at=("max",))
-
-
-def _kind(value: Any) -> str | None:
-    kinds = {"pair": "expects a pair", "distance": "expects a distance", "capacitive": "expects a capacitance"}
-    if isinstance(value, dict):
-        return next((tag for kind, tag in kinds.items() if kind in value), None)
-    return next((tag for kind, tag in kinds.items() if hasattr(value, kind)), None)
-
-
-Expectation = Annotated[
-    Annotated[PairExpectation, Tag("expects a pair")]
-    | Annotated[DistanceExpectation, Tag("expects a distance")]
-    | Annotated[CapacitiveExpectation, Tag("expects a capacitance")],
-    Discriminator(_kind),
-]
+if TYPE_CHECKING:
+    Expectation = Part
+else:
+    Expectation = Annotated[
+        Union[tuple(Annotated[part, Tag(f"about a {key}")] for key, part in PARTS.items())],  # noqa: UP007
+        Discriminator(_about),
+    ]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
+from replay import limits
 from replay.errors import Problem
+from replay.language.node import Node
 from replay.scenario.model import Scenario
-from replay.scenario.node import Node
 from replay.scenario.source import Library, SourceRule, dotted, problem_at, resolve_name
 from replay.scenario.yaml_text import parse
+from replay.sensing.kinds import KINDS
 
 MAX_INCLUDE_DEPTH: Final = 8
 FRAGMENT_KEYS: Final = ("include", "links", "motion", "collision", "sensors", "model", "expect")
@@ -20,8 +22,7 @@ _MERGED_MAPS: Final = {
     ("motion", "free"),
     ("collision",),
     ("sensors",),
-    ("sensors", "distance"),
-    ("sensors", "capacitive"),
+    *(("sensors", kind) for kind in KINDS),
 }
 _MERGED_LISTS: Final = {("motion", "moves"), ("collision", "disable"), ("expect",)}
 
@@ -54,6 +55,11 @@ class Text:
     def _tree(self, name: str, data: bytes, above: tuple[str, ...]) -> Node | None:
         self.sources[name] = data
         shown = self.library.shown(name)
+        if sum(map(len, self.sources.values())) > limits.YAML_TOTAL:
+            rule = f"with what was included before it has more than the {limits.YAML_TOTAL} bytes that are read"
+            self.problems.append(Problem(rule, file=shown))
+            self.whole = False
+            return None
         self.names[shown] = name
         root = parse(data, shown, self.problems)
         self.whole &= root is not None and root.whole

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from replay.sensing.kinds import KINDS, of_kind
 
 
 @dataclass(frozen=True)
@@ -12,18 +16,41 @@ class Layout:
     Attributes:
         links: L link names.
         joints: J names of scalar joints; `joint_units` their units, "rad" or "m".
-        shapes: names "link/shape" of the shapes that sensors sense, for the distance sensor's `shape` column.
+        shapes: names "link/shape" of the shapes that sensors sense, for columns that count them.
         pairs: P names "link/shape|link/shape" of the pairs that are tested.
-        distance_sensors: D names.
-        capacitive_sensors: C names.
-        objects: O names of the shapes that capacitive sensors sense.
+        objects: O names of the shapes that sensors with a value for each shape sense.
+        sensors: names by kind; those of a kind are `layout.distance_sensors` too, none where it is not there.
     """
 
-    links: tuple[str, ...]
-    joints: tuple[str, ...]
-    joint_units: tuple[str, ...]
-    shapes: tuple[str, ...]
-    pairs: tuple[str, ...]
-    distance_sensors: tuple[str, ...]
-    capacitive_sensors: tuple[str, ...]
-    objects: tuple[str, ...]
+    links: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
+    pairs: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
+    sensors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> Any:
+        return of_kind(self, name, "sensors", "_sensors", ())
+
+    def topics(self) -> dict[str, tuple[str, str]]:
+        """Return kind and name of each sensor by its topic."""
+        return {KINDS[kind].topic(name): (kind, name) for kind, names in self.sensors.items() for name in names}
+
+    def to_json(self) -> dict[str, tuple[str, ...]]:
+        """Return all names as a recording's metadata holds them."""
+        values = {key: names for key, names in vars(self).items() if key != "sensors"}
+        return values | {f"{kind}_sensors": self.sensors.get(kind, ()) for kind in KINDS}
+
+    @staticmethod
+    def from_json(values: Mapping[str, Sequence[str]]) -> Layout:
+        """Return the names that metadata hold; KeyError when a group is missing.
+
+        Of a kind that the recording does not know there are no sensors.
+        """
+        groups = {key: values[key] for key in ("links", "joints", "joint_units", "shapes", "pairs", "objects")}
+        sensors = {kind: values.get(f"{kind}_sensors", ()) for kind in KINDS}
+        return Layout(
+            **{key: tuple(names) for key, names in groups.items()},
+            sensors={kind: tuple(names) for kind, names in sensors.items()},
+        )

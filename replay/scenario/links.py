@@ -7,9 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from replay.scenario.fields import Axis, Name, Part, Pose, rejected
-from replay.scenario.shapes import Shape
-from replay.scenario.units import (
+from replay.language.fields import Axis, Name, Part, Pose, rejected
+from replay.language.units import (
     ANGLE,
     LENGTH,
     Angle,
@@ -20,6 +19,7 @@ from replay.scenario.units import (
     MaxVelocity,
     Quantity,
 )
+from replay.scenario.shapes import Shape
 
 AngleLimit = Annotated[float, Quantity("AngleLimit", ANGLE, infinite=True)]
 LengthLimit = Annotated[float, Quantity("LengthLimit", LENGTH, infinite=True)]

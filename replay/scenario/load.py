@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from replay import limits
 from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
+from replay.language.node import Node
 from replay.scenario.checks import check
 from replay.scenario.include import Text
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.names import Names
-from replay.scenario.node import Node
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
 from replay.scenario.sensors import Sensors
@@ -102,7 +104,7 @@ def load_model(file_or_name: str | Path) -> Model:
     if not isinstance(root.value, dict) or "links" in root.mapping:
         what = "a scenario" if root.mapping else root.shown()
         raise ScenarioError(
-            [root.place.problem(f"a model is a mapping of collision, distance, capacitive, not {what}")]
+            [root.place.problem(f"a model is a mapping of {', '.join(Model.model_fields)}, not {what}")]
         )
     if set(root.mapping) == {"model"}:
         raise ScenarioError([root.keys["model"].problem("model: a file of a model begins one level below this key")])
@@ -177,7 +179,8 @@ class _File:
             problems.extend(_not_told(problems, translate(error, root, Scenario)))
             named = named and not any("[key]" in detail["loc"] for detail in error.errors(include_url=False))
         if named:  # else names would be missed that are written, but not to be read
-            problems.extend(problem_at(root, path, rule) for path, rule in check(Names(root, scenario)))
+            found = itertools.islice(check(Names(root, scenario)), limits.PROBLEMS)
+            problems.extend(problem_at(root, path, rule) for path, rule in found)
         provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pydantic import Field, StrictInt, model_validator
+from pydantic import Field, create_model
 
-from replay.scenario.fields import Part, rejected
-from replay.scenario.units import NUMBER, Quantity
-
-Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below=1.0)]
+from replay.language.fields import Part, rejected
+from replay.sensing.kinds import KINDS
 
 METHOD_REVISIONS: Final = {
     "collision.bounds.obb": 1,
@@ -18,16 +16,10 @@ METHOD_REVISIONS: Final = {
     "collision.bounds.sphere": 1,
     "collision.narrowphase.gjk": 1,
     "collision.narrowphase.fcl": 1,
-    "collision.pieces.exact": 2,
+    "collision.pieces.exact": 3,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
-    "distance.exact": 3,
-    "distance.rays": 2,
-    "distance.thesis": 2,
-    "capacitive.tree": 5,
-    "capacitive.exact": 4,
-    "capacitive.midpoint": 3,
-}
+} | {f"{kind.name}.{method}": revision for kind in KINDS.values() for method, revision in kind.revisions.items()}
 """Bumped when a method's results change beyond the shipped rules; recorded with every result."""
 
 
@@ -45,74 +37,16 @@ class CollisionMethod(Part):
     """Which clearances are computed: those within collision.margin, none, or all."""
 
 
-class DistanceMethod(Part):
-    """How distance sensors are computed."""
-
-    method: Literal["exact", "rays", "thesis"] = "exact"
-    """The exact cone, a bundle of rays, or the thesis's five cases."""
-    count: Annotated[StrictInt, Field(ge=1, le=1_000_000)] | None = None
-    """Number of rays; only for method rays, 1000 when left out."""
-    engine: Literal["own", "embree"] | None = None
-    """What casts the rays; only for method rays, own when left out."""
-
-    @model_validator(mode="after")
-    def _options_belong(self) -> Self:
-        _belongs(self.method, "rays", {"count": self.count, "engine": self.engine})
-        return self
-
-
-class CapacitiveMethod(Part):
-    """How capacitive sensors are computed."""
-
-    method: Literal["tree", "exact", "midpoint"] = "tree"
-    """A tree that meets a tolerance, every triangle in closed form, or the thesis's midpoint splitting."""
-    rtol: Tolerance | None = None
-    """Relative tolerance of the sum; only for method tree, 1e-6 when left out."""
-    splits: Annotated[StrictInt, Field(ge=0, le=8)] | None = None
-    """Each triangle is split into 4^splits; only for method midpoint, 4 when left out."""
-
-    @model_validator(mode="after")
-    def _options_belong(self) -> Self:
-        _belongs(self.method, "tree", {"rtol": self.rtol})
-        _belongs(self.method, "midpoint", {"splits": self.splits})
-        return self
-
-
-def _belongs(method: str, needed: str, options: dict[str, object]) -> None:
-    for key, value in options.items():
-        if value is not None and method != needed:
-            raise rejected(f"has no effect with method {method}; it belongs to method {needed}", at=(key,))
-
-
-class Model(Part):
+class _Model(Part):
     """The version of each method."""
 
     collision: CollisionMethod = CollisionMethod()
     """Version of the collision methods."""
-    distance: DistanceMethod = DistanceMethod()
-    """Version of the distance method."""
-    capacitive: CapacitiveMethod = CapacitiveMethod()
-    """Version of the capacitive method."""
 
-    @property
-    def ray_count(self) -> int:
-        """Number of rays of method rays."""
-        return 1000 if self.distance.count is None else self.distance.count
+    if TYPE_CHECKING:
 
-    @property
-    def ray_engine(self) -> Literal["own", "embree"]:
-        """What casts the rays of method rays."""
-        return self.distance.engine or "own"
-
-    @property
-    def rtol(self) -> float:
-        """Relative tolerance of method tree."""
-        return 1e-6 if self.capacitive.rtol is None else self.capacitive.rtol
-
-    @property
-    def splits(self) -> int:
-        """Splits of method midpoint."""
-        return 4 if self.capacitive.splits is None else self.capacitive.splits
+        def __init__(self, **methods: Any) -> None: ...
+        def __getattr__(self, kind: str) -> Any: ...
 
     def identity(self, *, savings: bool = True) -> dict[str, str]:
         """Return what is recorded of the model: every option that has an effect, methods with their revisions.
@@ -124,26 +58,38 @@ class Model(Part):
             choice = getattr(self.collision, option)
             result[f"collision.{option}"] = f"{choice}@{METHOD_REVISIONS[f'collision.{option}.{choice}']}"
         result["collision.clearance"] = self.collision.clearance
-        distance, capacitive = self.distance.method, self.capacitive.method
-        result["distance"] = f"{distance}@{METHOD_REVISIONS[f'distance.{distance}']}"
-        if distance == "rays":
-            result |= {"distance.count": str(self.ray_count), "distance.engine": self.ray_engine}
-        result["capacitive"] = f"{capacitive}@{METHOD_REVISIONS[f'capacitive.{capacitive}']}"
-        if capacitive == "tree":
-            result["capacitive.rtol"] = repr(self.rtol)
-        if capacitive == "midpoint":
-            result["capacitive.splits"] = str(self.splits)
+        for name, kind in KINDS.items():
+            written = getattr(self, name)
+            result[name] = f"{written.method}@{kind.revisions[written.method]}"
+            result |= {f"{name}.{option}": str(value) for option, value in written.options().items()}
         if not savings:
             result["savings"] = "off"
         return result
 
 
+if TYPE_CHECKING:
+    Model = _Model
+else:
+    Model = create_model(
+        "Model",
+        __base__=_Model,
+        __module__=__name__,
+        __doc__=_Model.__doc__,
+        **{
+            kind.name: (kind.method, Field(kind.method(), description=f"Version of the {kind.name} method."))
+            for kind in KINDS.values()
+        },
+    )
+
+_COLLISION = {
+    "thesis2015": CollisionMethod(bounds="obb_vertices", narrowphase="gjk", pieces="convex", clearance="never")
+}
 BUILTIN_MODELS: Final = {
-    "thesis2015": Model(
-        collision=CollisionMethod(bounds="obb_vertices", narrowphase="gjk", pieces="convex", clearance="never"),
-        distance=DistanceMethod(method="thesis"),
-        capacitive=CapacitiveMethod(method="midpoint", splits=4),
-    ),
+    name: Model(
+        collision=collision,
+        **{kind.name: kind.models[name] for kind in KINDS.values() if name in kind.models},
+    )
+    for name, collision in _COLLISION.items()
 }
 """Models by name: `thesis2015` are the methods of the thesis itself."""
 
@@ -154,5 +100,5 @@ def builtin_model(value: Any) -> Any:
         return value
     if value not in BUILTIN_MODELS:
         names = ", ".join(sorted(BUILTIN_MODELS))
-        raise rejected(f"is no built-in model; write one of {names}, or a mapping of collision, distance, capacitive")
+        raise rejected(f"is no built-in model; write one of {names}, or a mapping of {', '.join(Model.model_fields)}")
     return BUILTIN_MODELS[value]

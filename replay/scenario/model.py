@@ -8,16 +8,16 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, model_validator
 
+from replay.language.fields import Name, Part, Text, Title, rejected
+from replay.language.units import Duration, Rate
 from replay.scenario.collision import Collision
 from replay.scenario.expectations import Between, Expectation, PairExpectation
-from replay.scenario.fields import Name, Part, Text, Title, rejected
 from replay.scenario.links import Link
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.motion import Motion
 from replay.scenario.sensors import Sensors
 from replay.scenario.source import Provenance
 from replay.scenario.sweep import Sweep
-from replay.scenario.units import Duration, Rate
 
 MAX_FRAMES: Final = 100_000_000
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from replay.scenario.fields import Flag, Name, Part, Placement, Vector, rejected
-from replay.scenario.units import (
+from replay.language.fields import Flag, Name, Part, Placement, Vector, rejected
+from replay.language.units import (
     Dimensioned,
     JointAcceleration,
     JointPosition,

@@ -12,17 +12,17 @@ from typing import Any, Final
 from pydantic import TypeAdapter, ValidationError
 
 from replay.collision.globs import Globs
+from replay.language.fields import Part
+from replay.language.node import Node
+from replay.language.units import Distance
 from replay.scenario.collision import Disable
-from replay.scenario.expectations import CapacitiveExpectation, DistanceExpectation, Expectation, PairExpectation
-from replay.scenario.fields import Part
+from replay.scenario.expectations import Expectation
 from replay.scenario.links import Continuous, Joint, Prismatic, Revolute
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoints
-from replay.scenario.node import Node
-from replay.scenario.sensors import CapacitiveSensor, DistanceSensor
 from replay.scenario.source import find
-from replay.scenario.units import Distance
+from replay.sensing.kinds import KINDS
 
 SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
 
@@ -135,16 +135,12 @@ class Names:
         return {name: self._entry(Keyframes, "motion", "free", name) for name in self._map("motion", "free")}
 
     @cached_property
-    def distance(self) -> dict[str, DistanceSensor | None]:
-        """Distance sensors by name."""
-        names = self._map("sensors", "distance")
-        return {name: self._entry(DistanceSensor, "sensors", "distance", name) for name in names}
-
-    @cached_property
-    def capacitive(self) -> dict[str, CapacitiveSensor | None]:
-        """Capacitive sensors by name."""
-        names = self._map("sensors", "capacitive")
-        return {name: self._entry(CapacitiveSensor, "sensors", "capacitive", name) for name in names}
+    def sensors(self) -> dict[str, dict[str, Any]]:
+        """Sensors by kind and name."""
+        return {
+            kind: {name: self._entry(KINDS[kind].part, "sensors", kind, name) for name in self._map("sensors", kind)}
+            for kind in KINDS
+        }
 
     @cached_property
     def disable(self) -> list[Disable | None]:
@@ -162,7 +158,7 @@ class Names:
         return found
 
     @cached_property
-    def expect(self) -> list[PairExpectation | DistanceExpectation | CapacitiveExpectation | None]:
+    def expect(self) -> list[Part | None]:
         """Expectations in order."""
         return [self._entry(Expectation, "expect", index) for index in self._list("expect")]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import types
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,20 +11,25 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from replay import limits
 from replay.errors import Problem
-from replay.scenario import decimal_comma
-from replay.scenario.fields import NAME_RULE, TITLE_RULE, Name, Title
-from replay.scenario.node import Node
+from replay.language import decimal_comma
+from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
+from replay.language.node import Node
+from replay.scenario.expectations import PARTS
 from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
 from replay.scenario.source import dotted, find, locate, problem_at
 
 Path = tuple[str | int, ...]
 
+_LIKELY, _LONG = 500, 200
+"""How many names a word is compared with, and how much of it: the time grows with their product."""
+
 
 def did_you_mean(word: str, known: Iterable[str], *, what: str = "known are") -> str:
     """Return "did you mean 'x'?", or all that is known when nothing is close."""
-    names = list(known)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    names = list(itertools.islice(known, _LIKELY))
+    close = difflib.get_close_matches(word[:_LONG], names, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
@@ -39,7 +45,7 @@ def translate(error: ValidationError, root: Node, model: type[BaseModel]) -> lis
         model: the model.
     """
     problems: dict[str, Problem] = {}
-    for detail in error.errors(include_url=False, include_input=False):
+    for detail in error.errors(include_url=False, include_input=False)[: limits.PROBLEMS]:
         if detail["type"] == "too_short" and _long_enough(detail, root, model):
             continue  # pydantic counts only the valid entries, and has told of the others
         problem = _translate(detail, root, model)
@@ -149,7 +155,7 @@ def _tag(kind: str, context: dict[str, Any], found: _Location, root: Node) -> Pr
         if node is not None and not isinstance(node.value, dict):
             return problem_at(root, path, "must be a mapping (key: value)", kind=True)
         return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing; known are {', '.join(found.tags)}")
-    return problem_at(root, path, "needs one of the keys pair, distance, capacitive")
+    return problem_at(root, path, f"needs one of the keys {', '.join(PARTS)}")
 
 
 @dataclass(frozen=True)

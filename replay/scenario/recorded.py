@@ -13,6 +13,7 @@ import numpy as np
 
 from replay.errors import Problem, RecordingError, count
 from replay.kinematics.motion import FreeTrack, Track
+from replay.language.units import ANGLE, LENGTH, TIME
 from replay.logs.csv_table import Format, is_excerpt, unit_of
 from replay.logs.exported import ENDINGS, as_csv
 from replay.logs.joint_csv import read_csv
@@ -23,7 +24,6 @@ from replay.scenario.problems import did_you_mean
 from replay.scenario.recorded_frames import pose_track
 from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window, unwrapped
 from replay.scenario.source import Library, SourceRule
-from replay.scenario.units import ANGLE, LENGTH, TIME
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario

@@ -94,7 +94,7 @@ def in_window(path: tuple[str | int, ...], series: Series, window: Window) -> Se
     return cut
 
 
-_WAY_OUT = "choose one by motion.recorded.channel or frame_id, or, if the log tells them not apart, record one alone"
+_WAY_OUT = "channel and frame_id do not tell them apart: record one alone, or each on a topic of its own"
 
 
 def check_turns(path: tuple[str | int, ...], time: NDArray[np.int64], value: Floats) -> None:

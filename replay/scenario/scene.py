@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,9 @@ from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
 from replay.scenario.notes import notes, piece_notes
-from replay.scenario.script import linkage, script, transform
+from replay.scenario.script import linkage, script
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
-from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
-from replay.sensing.distance import DistanceSensor
+from replay.sensing.kinds import KINDS, of_kind
 from replay.sensing.target import Target, make_target
 
 Color = tuple[int, int, int, int]
@@ -67,7 +67,7 @@ class Scene:
         shapes: all shapes, sorted by name.
         bodies, pairs: what is tested for collision; no bodies when no pair is.
         targets: what sensors sense, sorted by name; none when there are no sensors.
-        distance_sensors, capacitive_sensors: sorted by name.
+        sensors: by kind, sorted by name; those of a kind are `scene.distance_sensors` too.
         layout: the names behind the columns of results.
         notes: what a reader should know about the scenario and its meshes, one line each.
     """
@@ -81,10 +81,12 @@ class Scene:
     bodies: tuple[CollisionBody, ...]
     pairs: tuple[Pair, ...]
     targets: tuple[Target, ...]
-    distance_sensors: tuple[DistanceSensor, ...]
-    capacitive_sensors: tuple[CapacitiveSensor, ...]
+    sensors: Mapping[str, tuple[Any, ...]]
     layout: Layout
     notes: tuple[str, ...]
+
+    def __getattr__(self, name: str) -> Any:
+        return of_kind(self, name, "sensors", "_sensors", ())
 
     @property
     def frames(self) -> int:
@@ -98,8 +100,7 @@ class Scene:
             "shapes": len(self.shapes),
             "triangles": sum(len(shape.solid.triangles) for shape in self.shapes),
             "pairs": len(self.pairs),
-            "distance_sensors": len(self.distance_sensors),
-            "capacitive_sensors": len(self.capacitive_sensors),
+            **{f"{kind}_sensors": len(sensors) for kind, sensors in self.sensors.items()},
         }
 
     @property
@@ -142,10 +143,8 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
     machine = linkage(scenario)
     scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
-    sensors = scenario.sensors
-    distance = tuple(_distance_sensor(scenario, machine, name) for name in sorted(sensors.distance))
-    capacitive = tuple(_capacitive_sensor(scenario, machine, name) for name in sorted(sensors.capacitive))
-    sensed = [shape for shape in scene_shapes if shape.sensed] if distance or capacitive else []
+    sensors = {kind: _sensors(scenario, machine, kind) for kind in KINDS}
+    sensed = [shape for shape in scene_shapes if shape.sensed] if any(sensors.values()) else []
     targets = tuple(
         make_target(shape.name, shape.link, shape.solid.triangles, closing=shape.solid.closing_of_inside)
         for shape in sensed
@@ -157,9 +156,8 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         joint_units=tuple(joint.type.unit for joint in machine.joints),
         shapes=names,
         pairs=tuple(pair.name for pair in pairs),
-        distance_sensors=tuple(sensor.name for sensor in distance),
-        capacitive_sensors=tuple(sensor.name for sensor in capacitive),
-        objects=names if capacitive else (),
+        objects=names if any(sensors[kind] and _each_object(kind) for kind in KINDS) else (),
+        sensors={kind: tuple(sensor.name for sensor in found) for kind, found in sensors.items()},
     )
     _check_expectations(scenario, layout)
     return Scene(
@@ -172,8 +170,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         bodies=bodies,
         pairs=pairs,
         targets=targets,
-        distance_sensors=distance,
-        capacitive_sensors=capacitive,
+        sensors=sensors,
         layout=layout,
         notes=(
             *(note.message for note in notes(scenario)),
@@ -208,7 +205,7 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
                 path = ("links", link, "shapes", name, "file")
                 problems.append(scenario.provenance.problem(path, f"cannot be used: {error.reason}"))
                 continue
-            placed = solid.transformed(transform(shape.pose))
+            placed = solid.transformed(shape.pose.transform())
             index = machine.link_index(link)
             color = _color(shape.color)
             found.append(SceneShape(f"{link}/{name}", index, placed, color, shape.collide, shape.sense))
@@ -257,43 +254,22 @@ def _collision(
         raise ScenarioError([scenario.provenance.problem(("collision", "pairs"), rule)]) from None
 
 
-def _ignored(machine: Linkage, patterns: Sequence[str]) -> frozenset[int]:
-    return frozenset(
-        index for index, name in enumerate(machine.link_names) if any(matches(pattern, name) for pattern in patterns)
+def _sensors(scenario: Scenario, machine: Linkage, kind: str) -> tuple[Any, ...]:
+    """Return the sensors of a kind, sorted by name."""
+    links = list(enumerate(machine.link_names))
+    return tuple(
+        KINDS[kind].sensor(
+            name,
+            written,
+            machine.link_index(written.link),
+            frozenset(k for k, link in links if any(matches(pattern, link) for pattern in written.ignore)),
+        )
+        for name, written in sorted(scenario.sensors.of(kind).items())
     )
 
 
-def _distance_sensor(scenario: Scenario, machine: Linkage, name: str) -> DistanceSensor:
-    written = scenario.sensors.distance[name]
-    return DistanceSensor(
-        name=name,
-        link=machine.link_index(written.link),
-        T_link_sensor=transform(written.pose),
-        aperture=written.aperture,
-        range=written.range,
-        min_range=written.min_range,
-        ignored_links=_ignored(machine, written.ignore),
-    )
-
-
-def _capacitive_sensor(scenario: Scenario, machine: Linkage, name: str) -> CapacitiveSensor:
-    written = scenario.sensors.capacitive[name]
-    plates = tuple(
-        Plate(name=plate, T_link_plate=transform(part.pose), half_size=0.5 * np.array(part.size))
-        for plate, part in sorted(written.plates.items())
-    )
-    return CapacitiveSensor(
-        name=name,
-        link=machine.link_index(written.link),
-        plates=plates,
-        coupling=written.coupling,
-        permittivity=written.permittivity,
-        supply=written.supply,
-        stray_capacitance=written.stray_capacitance,
-        side=written.side,
-        faces=written.faces,
-        ignored_links=_ignored(machine, written.ignore),
-    )
+def _each_object(kind: str) -> bool:
+    return any(field.each == "objects" for field in KINDS[kind].columns.fields())
 
 
 def _check_expectations(scenario: Scenario, layout: Layout) -> None:

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from replay.scenario.fields import Part
+from replay.language.fields import Part
+from replay.language.units import QUANTITY_KEY
 from replay.scenario.methods import BUILTIN_MODELS, Model
 from replay.scenario.model import Fragment, Scenario
-from replay.scenario.units import QUANTITY_KEY
 
 FILES: Final[dict[str, type[Part]]] = {
     "scenario.schema.json": Scenario,

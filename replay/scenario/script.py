@@ -7,30 +7,16 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from replay.errors import InvalidValue, MotionLimitError, Problem
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.kinematics.motion import Keyframe, Move, Script, check_limits, joint_profiles
 from replay.kinematics.profiles import Waypoint
+from replay.language.units import Dimensioned
 from replay.numerics import transforms
 from replay.scenario import links
-from replay.scenario.fields import Placement
 from replay.scenario.model import Scenario
 from replay.scenario.motion import Keyframe as WrittenKeyframe
 from replay.scenario.motion import Waypoint as WrittenWaypoint
-from replay.scenario.units import Dimensioned
-
-
-def transform(pose: Placement) -> NDArray[np.float64]:
-    """Return a pose as a transform (4, 4) into the frame it is given in."""
-    if pose.quat_xyzw is not None:
-        T = transforms.from_quaternion(np.array(pose.quat_xyzw))
-    else:
-        T = transforms.from_rpy(np.array(pose.rpy or (0.0, 0.0, 0.0)))
-    T[:3, 3] = pose.xyz
-    return T
 
 
 def linkage(scenario: Scenario) -> Linkage:
@@ -98,7 +84,7 @@ def _link(name: str, link: links.Link) -> Link:
         )
     if isinstance(joint, links.Revolute | links.Prismatic):
         result = replace(result, lower=joint.lower, upper=joint.upper)
-    return Link(name, link.parent, transform(link.pose), result)
+    return Link(name, link.parent, link.pose.transform(), result)
 
 
 def _waypoint(point: WrittenWaypoint) -> Waypoint:
@@ -110,5 +96,5 @@ def _value(quantity: Dimensioned | None) -> float | None:
 
 
 def _keyframe(key: WrittenKeyframe) -> Keyframe:
-    x, y, z, w = (float(value) for value in transforms.to_quaternion(transform(key)))
+    x, y, z, w = (float(value) for value in transforms.to_quaternion(key.transform()))
     return Keyframe(key.time, key.xyz, (x, y, z, w))

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from replay.geometry.mesh_file import FORMATS
-from replay.scenario.fields import Flag, Part, Pose, Size2, Size3, rejected
-from replay.scenario.units import Aperture, Scale, Size
+from replay.language.fields import Flag, Part, Pose, Size2, Size3, rejected
+from replay.language.units import Aperture, Scale, Size
 
 FINEST_CHORD = 1e-5
 """Smallest chord error as a fraction of the radius: a sphere then has about 0.6 million triangles."""

@@ -15,15 +15,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
+from replay import limits
 from replay.errors import Problem
-from replay.logs.lfs_pointer import LFS_POINTER, is_lfs_pointer
-from replay.scenario.node import Node, Place
+from replay.language.node import Node, Place
+from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 if TYPE_CHECKING:
     from replay.kinematics.motion import FreeTrack, Track
 
 PACKAGE: Final = "package://"
-MAX_FILE_BYTES: Final = 1 << 30
 
 _INSTALL: Final = {"pyskindose": "pip install --no-deps pyskindose"}
 """How to get the packages that are known; what else brings a package of some name, only its user knows."""
@@ -223,8 +223,8 @@ def _read(path: Path) -> bytes:
         if path.exists() and not path.is_file():
             raise SourceRule("is not a regular file")
         size = path.stat().st_size
-        if size > MAX_FILE_BYTES:
-            raise SourceRule(f"has {size} bytes; at most {MAX_FILE_BYTES} are read")
+        if size > limits.FILE:
+            raise SourceRule(f"has {size} bytes; at most {limits.FILE} are read")
         data = path.read_bytes()
         if is_lfs_pointer(data):
             raise SourceRule(LFS_POINTER)

@@ -5,18 +5,21 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from replay.errors import Problem
-from replay.scenario.fields import Part, rejected
-from replay.scenario.node import Node, Place
+from replay import limits
+from replay.errors import Problem, ScenarioError
+from replay.language.fields import Part, rejected
+from replay.language.node import Node, Place
 from replay.scenario.source import dotted
+from replay.sensing.kinds import KINDS
 
-MAX_CASES: Final = 10_000
+MAX_CASES: Final = limits.SWEEP_CASES
 MAX_NAME: Final = 100
 
 _PATH = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*(\[[0-9]+\][A-Za-z0-9_.\-]*)*$"
@@ -28,8 +31,7 @@ _MAY_BE_LEFT_OUT: Final = {
     ("collision",),
     ("model",),
     ("model", "collision"),
-    ("model", "distance"),
-    ("model", "capacitive"),
+    *(("model", kind) for kind in KINDS),
 }
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
 
@@ -54,6 +56,9 @@ class Sweep(Part):
         if count > MAX_CASES:
             shown = count if count <= 10**9 else "more than 10^9"
             raise rejected(f"makes {shown} cases; at most {MAX_CASES} are run")
+        paths = self.grid or {path for case in self.list or () for path in case}
+        if len(paths) > limits.SWEEP_PATHS:
+            raise rejected(f"names {len(paths)} different paths; at most {limits.SWEEP_PATHS} are swept")
         return self
 
 
@@ -76,6 +81,9 @@ def cases(root: Node, name: str) -> tuple[SweepCase, ...]:
     if sweep is None:
         return ()
     combinations = list(_combinations(sweep))
+    if len(combinations) * _nodes(root) > limits.SWEEP_VALUES:
+        rule = f"makes {len(combinations)} cases of {_nodes(root)} values each; at most {limits.SWEEP_VALUES} values"
+        raise ScenarioError([sweep.place.problem(f"sweep {rule} are read altogether")])
     labels = _labels(list(dict.fromkeys(path for values in combinations for path in values)))
     names: dict[str, None] = {}
     found = []
@@ -125,18 +133,19 @@ def _combinations(sweep: Node) -> Iterator[dict[str, Node]]:
             yield dict(entry.mapping)
 
 
+def _nodes(node: Node) -> int:
+    """Return how many values a tree has, with those that aliases share counted each time."""
+    return 1 + sum(map(_nodes, (*node.mapping.values(), *node.sequence)))
+
+
 def _labels(paths: Sequence[str]) -> dict[str, str]:
     """Return the shortest end of each path, in whole steps, that is not the end of another one."""
     steps = {path: re.split(r"\.|(?=\[)", path) for path in paths}
-    labels = {}
-    for path, mine in steps.items():
-        ends = (mine[-count:] for count in range(1, len(mine) + 1))
-        end = next(
-            (end for end in ends if sum(other[-len(end) :] == end for other in steps.values()) == 1),
-            mine,
-        )
-        labels[path] = _safe(".".join(end))
-    return labels
+    ends = {path: [tuple(mine[-count:]) for count in range(1, len(mine) + 1)] for path, mine in steps.items()}
+    shared = Counter(end for mine in ends.values() for end in mine)
+    return {
+        path: _safe(".".join(next((end for end in mine if shared[end] == 1), mine[-1]))) for path, mine in ends.items()
+    }
 
 
 def _label(node: Node) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import count
-from replay.scenario.expectations import When
+from replay.language.fields import When
 
 Times = NDArray[np.int64]
 Values = NDArray[np.float64]

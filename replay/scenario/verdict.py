@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns, Level
-from replay.scenario.expectations import Between, CapacitiveExpectation, DistanceExpectation, PairExpectation
+from replay.language.fields import Part
+from replay.language.node import Place
+from replay.scenario.expectations import Between, PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.names import matches
-from replay.scenario.node import Place
 from replay.scenario.source import Provenance
 from replay.scenario.tallies import Begin, Count, Extremes, Tally, Times, Values
-from replay.sensing.columns import CapacitiveColumns, Detection, DistanceColumns
+from replay.sensing.kind import Expected
+from replay.sensing.kinds import KINDS
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,7 @@ class Outcome:
 @dataclass(frozen=True)
 class _Block:
     collision: CollisionColumns | None
-    distance: DistanceColumns | None
-    capacitive: CapacitiveColumns | None
+    readings: Mapping[str, Any]
 
 
 @dataclass
@@ -67,7 +69,7 @@ class ExpectationCheck:
 
     def __init__(
         self,
-        expectations: Sequence[PairExpectation | DistanceExpectation | CapacitiveExpectation],
+        expectations: Sequence[Part],
         layout: Layout,
         *,
         clearance: str = "near",
@@ -82,20 +84,15 @@ class ExpectationCheck:
         for index, expectation in enumerate(expectations):
             if isinstance(expectation, PairExpectation):
                 self._add_pairs(("expect", index), expectation)
-            elif isinstance(expectation, DistanceExpectation):
-                self._add_distance(("expect", index), expectation)
-            else:
-                self._add_capacitive(("expect", index), expectation)
+                continue
+            for kind in KINDS.values():
+                if isinstance(expectation, kind.expectation):
+                    for expected in kind.expected:
+                        self._add_reading(("expect", index), kind.name, expectation, expected)
 
-    def update(
-        self,
-        time_ns: Times,
-        collision: CollisionColumns | None,
-        distance: DistanceColumns | None,
-        capacitive: CapacitiveColumns | None,
-    ) -> None:
-        """Take the results of the next n frames, at times (n,) [ns]."""
-        block = _Block(collision, distance, capacitive)
+    def update(self, time_ns: Times, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
+        """Take the results of the next n frames, at times (n,) [ns]: of pairs, and of each kind of sensor by name."""
+        block = _Block(collision, readings)
         for check in self._checks:
             check.state.update(time_ns, check.take(block))
 
@@ -150,50 +147,26 @@ class ExpectationCheck:
             text = f"{about}: clearance >= {least:.6g} m"
             self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, bounds))
 
-    def _add_distance(self, path: tuple[str | int, ...], expected: DistanceExpectation) -> None:
-        column = self._layout.distance_sensors.index(expected.distance)
+    def _add_reading(self, path: tuple[str | int, ...], kind: str, written: Any, expected: Expected) -> None:
+        name = getattr(written, kind)
+        column = self._layout.sensors[kind].index(name)
+        asked = getattr(written, expected.what) if expected.inside else written
+        here = (*path, expected.what) if expected.inside else path
 
-        def reading(block: _Block) -> Values:
-            assert block.distance is not None
-            return block.distance.distance[:, column]
+        def take(block: _Block) -> Values:
+            return expected.values(block.readings[kind])[:, column].astype(np.float64)
 
-        def detected(block: _Block) -> Values:
-            assert block.distance is not None
-            found: Values = (block.distance.status[:, column] != Detection.NOTHING).astype(np.float64)
-            return found
+        def add(text: str, where: tuple[str | int, ...], state: Tally) -> None:
+            self._checks.append(_Check(f"{name}: {expected.what} {text}", where, expected.what, take, state))
 
-        for key, bound, symbol in (("min", expected.min, ">="), ("max", expected.max, "<=")):
-            if bound is not None:
-                state = Extremes("m", low=bound if key == "min" else None, high=bound if key == "max" else None)
-                text = f"{expected.distance}: distance {symbol} {bound:.6g} m"
-                self._checks.append(_Check(text, (*path, key), "distance", reading, state))
-        if expected.detected is not None:
-            text = f"{expected.distance}: detected {expected.detected}"
-            check = _Check(text, (*path, "detected"), "detected", detected, Count(expected.detected))
-            self._checks.append(check)
-
-    def _add_capacitive(self, path: tuple[str | int, ...], expected: CapacitiveExpectation) -> None:
-        column = self._layout.capacitive_sensors.index(expected.capacitive)
-
-        def output(block: _Block) -> Values:
-            assert block.capacitive is not None
-            return block.capacitive.output_voltage[:, column]
-
-        def saturated(block: _Block) -> Values:
-            assert block.capacitive is not None
-            return block.capacitive.saturated[:, column].astype(np.float64)
-
-        limits = expected.output
-        for key, symbol in (("min", ">="), ("max", "<=")):
-            bound = None if limits is None else getattr(limits, key)
-            if bound is not None:
-                state = Extremes("V", low=bound if key == "min" else None, high=bound if key == "max" else None)
-                text = f"{expected.capacitive}: output {symbol} {bound:.6g} V"
-                self._checks.append(_Check(text, (*path, "output", key), "output", output, state))
-        if expected.saturated is not None:
-            text = f"{expected.capacitive}: saturated {expected.saturated}"
-            check = _Check(text, (*path, "saturated"), "saturated", saturated, Count(expected.saturated))
-            self._checks.append(check)
+        if expected.unit:
+            for key, bound, symbol in (("low", "min", ">="), ("high", "max", "<=")):
+                value = getattr(asked, bound, None)
+                if value is not None:
+                    state = Extremes(expected.unit, **{key: value})
+                    add(f"{symbol} {value:.6g} {expected.unit}", (*here, bound), state)
+        elif asked is not None:
+            add(asked, here, Count(asked))
 
 
 def matching_pairs(pairs: Sequence[str], patterns: tuple[str, str]) -> NDArray[np.intp]:

@@ -12,23 +12,17 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
+from replay import limits
 from replay.errors import Problem
-from replay.scenario import decimal_comma
-from replay.scenario.node import Node, Place, Scalar
+from replay.language import decimal_comma
+from replay.language.node import Node, Place, Scalar
 
-__all__ = ["MAX_BYTES", "MAX_DEPTH", "MAX_DIGITS", "MAX_NODES", "Node", "parse"]
+__all__ = ["MAX_DEPTH", "MAX_NODES", "Node", "parse"]
 
-MAX_BYTES: Final = 4 << 20
-"""Scenario text is written by people; 4 MiB is read in about 20 s, and more is a mistake."""
-
-MAX_DEPTH: Final = 40
-"""Nested collections; the language itself needs 8."""
-
-MAX_NODES: Final = 200_000
-"""Nodes after every alias is written out, which stops a few lines of aliases from becoming gigabytes."""
-
-MAX_DIGITS: Final = 400
-"""Characters of one number."""
+MAX_DEPTH: Final = limits.YAML_DEPTH
+MAX_NODES: Final = limits.YAML_NODES
+MAX_MESSAGE: Final = 400
+"""Characters of what is said of one place."""
 
 _KEPT_BYTES: Final = 16 << 10  # of one file; what is longer is seldom shared, and its tree is large
 _KEPT_FILES: Final = 32
@@ -74,8 +68,8 @@ _kept = functools.lru_cache(maxsize=_KEPT_FILES)(_read)
 
 
 def _parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
-    if len(data) > MAX_BYTES:
-        problems.append(Problem(f"the file has {len(data)} bytes; at most {MAX_BYTES} are read", file=file))
+    if len(data) > limits.YAML_BYTES:
+        problems.append(Problem(f"the file has {len(data)} bytes; at most {limits.YAML_BYTES} are read", file=file))
         return None
     try:
         text = data.decode("utf-8-sig")
@@ -97,8 +91,10 @@ def _events(text: str, file: str, problems: list[Problem]) -> Iterator[Any]:
     from ruamel.yaml.reader import ReaderError
 
     line = column = 1
+    reader = YAML(typ="safe", pure=True)
+    reader.Scanner = _scanner()
     try:
-        for event in YAML(typ="safe", pure=True).parse(text):
+        for event in reader.parse(text):
             line, column = event.end_mark.line + 1, event.end_mark.column + 1
             yield event
     except ReaderError as error:
@@ -121,6 +117,21 @@ def _events(text: str, file: str, problems: list[Problem]) -> Iterator[Any]:
     except Exception as error:  # the scanner lets a bad escape or directive out as whatever Python raised
         problems.append(Problem(f"not YAML after this: {error}", file=file, line=line, column=column))
         raise _Rejected from None
+
+
+@functools.cache
+def _scanner() -> Any:
+    """Return ruamel.yaml's scanner with a bound on tags, whose time grows with the square of their length."""
+    from ruamel.yaml.scanner import Scanner, ScannerError
+
+    class Bounded(Scanner):
+        def scan_tag(self) -> Any:
+            if re.match(rf"\S{{{limits.YAML_TAG + 1}}}", self.reader.prefix(limits.YAML_TAG + 1)):
+                rule = f"a tag of more than {limits.YAML_TAG} characters"
+                raise ScannerError(None, None, rule, self.reader.get_mark())
+            return super().scan_tag()
+
+    return Bounded
 
 
 class _Builder:
@@ -158,7 +169,12 @@ class _Builder:
         return Place(self.file, event.start_mark.line + 1, event.start_mark.column + 1)
 
     def report(self, event: Any, message: str) -> None:
+        if len(message) > MAX_MESSAGE:
+            message = f"{message[: MAX_MESSAGE // 2]}...{message[-MAX_MESSAGE // 4 :]}"
         self.problems.append(self.place(event).problem(message))
+        if len(self.problems) >= limits.PROBLEMS:
+            self.problems.append(Problem(f"more is wrong than the {limits.PROBLEMS} that are told", file=self.file))
+            raise _Rejected
 
     def reject(self, event: Any, message: str) -> None:
         self.report(event, message)
@@ -287,8 +303,8 @@ class _Builder:
         integer = _INTEGER.fullmatch(text) is not None
         if not integer and _FLOAT.fullmatch(text) is None:
             return text
-        if len(text) > MAX_DIGITS:
-            self.report(event, f"a number of {len(text)} characters; at most {MAX_DIGITS} are read")
+        if len(text) > limits.NUMBER_DIGITS:
+            self.report(event, f"a number of {len(text)} characters; at most {limits.NUMBER_DIGITS} are read")
             return 0
         if integer:
             bases = {"0o": 8, "0x": 16}

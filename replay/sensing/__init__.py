@@ -1,4 +1,4 @@
-"""The distance sensor and the capacitive sensor."""
+"""Sensors: a folder for each kind, and in `kind` what a kind is to the other rooms."""
 
 from replay import submodules
 

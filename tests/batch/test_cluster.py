@@ -1,13 +1,10 @@
 """A local Dask cluster: the same verdicts and the same bytes as without, also when one of its workers is killed."""
 
-import json
-import os
+import io
+import logging
 import signal
-import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
 
 import psutil
 import pytest
@@ -17,47 +14,23 @@ from replay.batch.case import Status
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.cli.exit_codes import ExitCode
 from replay.errors import InvalidValue, WorkerError
-from tests.batch import scenes
-from tests.batch.test_run import files_of
+from tests.batch import clusters, scenes
+from tests.batch.test_run import Remarks, files_of
 from tests.cli.test_regress import check_verdicts, night, prepare
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
 def cluster(tmp_path):
-    """Yield the scheduler's address and the pids of two workers."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DASK_DISTRIBUTED__SCHEDULER__WORK_STEALING": "False"}
-    address = tmp_path / "scheduler.json"
-    options = {"cwd": tmp_path, "env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-
-    def dask(name, *more):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{name}", "--scheduler-file", str(address), *more]
-        return subprocess.Popen(command, **options)
-
-    scheduler = dask("scheduler", "--port", "0", "--no-dashboard")
-    common = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path))
-    workers = [dask("worker", *common) for _ in range(2)]
-    try:
-        while not address.is_file():
-            time.sleep(0.1)
-            assert scheduler.poll() is None
-        listening = json.loads(address.read_text())["address"]
-        with Client(listening, timeout=60, set_as_default=False) as client:
-            client.wait_for_workers(len(workers), timeout=60)  # or the first to come gets every task
-        yield listening, workers
-    finally:
-        for process in (*workers, scheduler):
-            family = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
-            process.kill()
-            process.wait()
-            for member in family:
-                member.kill()
+    """Yield the scheduler's address and two workers."""
+    with clusters.cluster(tmp_path) as found:
+        with Client(found.address, timeout=60, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)  # or the first to come gets every task
+        yield found
 
 
 def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
-    address, workers = cluster
+    address, workers = cluster.address, cluster.workers
     names = ["crash", "hang", *(f"good_{k}" for k in range(3))]
     scenarios = [scenes.scene(name) for name in names]
 
@@ -83,7 +56,7 @@ def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path
 
 @pytest.mark.soak
 def test_a_night_of_two_hundred_on_a_cluster_that_loses_a_worker(cluster, tmp_path, monkeypatch):
-    address, workers = cluster
+    address, workers = cluster.address, cluster.workers
     counts = {"plain": 175, "bad": 5, "differing": 10}
     prepare(tmp_path, **counts)
     local = files_of(tmp_path / "first")
@@ -109,7 +82,7 @@ def test_a_night_of_two_hundred_on_a_cluster_that_loses_a_worker(cluster, tmp_pa
 
 def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
-    address, workers = cluster
+    address, workers = cluster.address, cluster.workers
 
     def computing():
         return [child for worker in workers for child in psutil.Process(worker.pid).children(recursive=True)]
@@ -147,3 +120,44 @@ def test_a_scheduler_that_does_not_answer_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_CONNECT", 1)
     with pytest.raises(WorkerError, match="does not answer"):
         run_all([scenes.scene("a")], tmp_path, execution=Execution(dask="tcp://127.0.0.1:9"))
+
+
+def test_a_scheduler_without_workers_is_told_and_given_up_in_the_end(tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_WAIT", 6.0)
+    remarks = Remarks()
+    with clusters.cluster(tmp_path, workers=0) as found:
+        begin = time.monotonic()
+        execution = Execution(dask=found.address)
+        run = run_all([scenes.scene("a"), scenes.scene("b")], tmp_path / "out", execution=execution, watch=remarks)
+        assert time.monotonic() - begin < 20.0
+    waiting = "has no workers; waiting for one"
+    assert [waiting in remark and found.address in remark for remark in remarks.said] == [True]
+    assert [result.error for result in run.results] == ["on the cluster: there has been no worker for 0 min"] * 2
+    assert not run.interrupted
+
+
+def test_a_scheduler_that_dies_is_one_line_a_scenario(cluster, tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
+    monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_CONNECT", 5)
+
+    class Killer(Unwatched):
+        def done(self, result):
+            if result.name == "good":
+                cluster.scheduler.send_signal(signal.SIGKILL)
+
+    scenarios = [scenes.scene("good", duration=3), *(scenes.scene(f"hang_{k}") for k in range(3))]
+    logged = io.StringIO()
+    handler = logging.StreamHandler(logged)
+    for name in ("distributed", "distributed.client"):
+        monkeypatch.setattr(logging.getLogger(name), "handlers", [handler])
+    begin = time.monotonic()
+    out = tmp_path / "out"
+    run = run_all(scenarios, out, rrd=False, execution=Execution(dask=cluster.address), watch=Killer())
+    assert time.monotonic() - begin < 60.0
+    lost = "on the cluster: the connection to the scheduler was lost before this scenario was done"
+    assert {result.name: result.error for result in run.results} == {
+        "good": "",
+        **{f"hang_{k}": lost for k in range(3)},
+    }
+    assert not run.interrupted
+    assert (logged.getvalue(), capfd.readouterr().err) == ("", "")

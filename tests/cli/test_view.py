@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 import rerun as rr
@@ -14,7 +15,15 @@ from replay.cli.exit_codes import ExitCode
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 def test_the_viewer_does_not_outlive_the_command(tmp_path):
     viewer = tmp_path / "viewer"
-    viewer.write_text(f"#!/bin/sh\necho $@ > {tmp_path}/arguments\necho $$ > {tmp_path}/pid\nexec sleep 600\n")
+    lines = [
+        "#!/bin/sh",
+        f"cd {tmp_path}",
+        "echo $@ > arguments",
+        "env > environment",
+        "echo $$ > pid",
+        "exec sleep 600",
+    ]
+    viewer.write_text("\n".join(lines) + "\n")
     viewer.chmod(0o700)
     with rr.RecordingStream("replay") as stream:
         stream.save(tmp_path / "a.rrd")
@@ -29,6 +38,13 @@ def test_the_viewer_does_not_outlive_the_command(tmp_path):
             time.sleep(0.05)
         process.terminate()
         assert process.wait(timeout=30.0) == ExitCode.INTERRUPTED
-    assert (tmp_path / "arguments").read_text().split() == [str(tmp_path / "a.rrd"), "--bind", "127.0.0.1"]
+    *arguments, port = (tmp_path / "arguments").read_text().split()
+    assert arguments == [str(tmp_path / "a.rrd"), "--hide-welcome-screen", "--bind", "127.0.0.1", "--port"]
+    assert int(port) != 9876, "another viewer may have the usual one, and would be the one that shows"
+    environment = dict(
+        line.split("=", 1) for line in (tmp_path / "environment").read_text().splitlines() if "=" in line
+    )
+    assert environment["XDG_CONFIG_HOME"] == environment["TMPDIR"] != os.environ.get("TMPDIR")
+    assert not Path(environment["XDG_CONFIG_HOME"]).exists(), "the viewer's home goes with it"
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)

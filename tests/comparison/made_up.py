@@ -17,7 +17,8 @@ from replay.recording.provenance import Provenance, describe
 from replay.recording.reader import Recording
 from replay.recording.scene_view import BodyView, SceneView
 from replay.recording.writer import McapWriter
-from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.distance.columns import DistanceColumns
 from replay.simulation import BLOCK_FRAMES, FrameBlock, Layout
 
 LAYOUT = Layout(
@@ -26,9 +27,8 @@ LAYOUT = Layout(
     joint_units=("m", "rad"),
     shapes=("arm/beam", "stand/base", "stand/column"),
     pairs=("arm/beam|stand/base", "arm/beam|stand/column"),
-    distance_sensors=("left", "right"),
-    capacitive_sensors=("guard",),
     objects=("stand/base", "stand/column"),
+    sensors={"distance": ("left", "right"), "capacitive": ("guard",)},
 )
 FILES = {"run.yaml": b"version: 1\nname: made_up\n", "meshes/beam.stl": b"solid beam"}
 CONTACT = slice(40, 60)
@@ -66,24 +66,26 @@ def recording(frames: int = 100, layout: Layout = LAYOUT, name: str = "made_up")
         link_poses=poses,
         link_quaternions=transforms.to_quaternion(poses),
         collision=CollisionColumns(level, clearance, evaluated, np.zeros_like(evaluated)),
-        distance=DistanceColumns(
-            status=seen.astype(np.uint8),
-            distance=reading,
-            point=reading[:, :, None] * np.array([1.0, 0.5, 0.0]),
-            point_sensor=reading[:, :, None] * np.array([0.0, 0.0, 1.0]),
-            normal=np.where(seen, 1.0, np.nan)[:, :, None] * np.array([0.0, 0.0, 1.0]),
-            shape=index,
-            triangle=np.where(seen, t[:, None] // 10, -1).astype(np.int32),
-            case=np.where(seen, 1, 0).astype(np.uint8),
-        ),
-        capacitive=CapacitiveColumns(
-            capacitance=capacitance,
-            per_object=capacitance[:, :, None] * np.linspace(0.4, 0.6, count["objects"]),
-            output_voltage=voltage,
-            delta_output=2.5 - voltage,
-            saturated=np.zeros((frames, plates), dtype=bool),
-            touching=np.zeros((frames, plates), dtype=bool),
-        ),
+        readings={
+            "distance": DistanceColumns(
+                status=seen.astype(np.uint8),
+                distance=reading,
+                point=reading[:, :, None] * np.array([1.0, 0.5, 0.0]),
+                point_sensor=reading[:, :, None] * np.array([0.0, 0.0, 1.0]),
+                normal=np.where(seen, 1.0, np.nan)[:, :, None] * np.array([0.0, 0.0, 1.0]),
+                shape=index,
+                triangle=np.where(seen, t[:, None] // 10, -1).astype(np.int32),
+                case=np.where(seen, 1, 0).astype(np.uint8),
+            ),
+            "capacitive": CapacitiveColumns(
+                capacitance=capacitance,
+                per_object=capacitance[:, :, None] * np.linspace(0.4, 0.6, count["objects"]),
+                output_voltage=voltage,
+                delta_output=2.5 - voltage,
+                saturated=np.zeros((frames, plates), dtype=bool),
+                touching=np.zeros((frames, plates), dtype=bool),
+            ),
+        },
         events=Events.none(),
         files=FILES,
         loss=None,
@@ -104,8 +106,10 @@ def with_provenance(original: Recording, **values: Any) -> Recording:
 
 
 def with_names(original: Recording, **names: tuple[str, ...]) -> Recording:
-    """Return a recording whose layout differs."""
-    return with_provenance(original, layout=dataclasses.replace(original.layout, **names))
+    """Return a recording whose layout differs; `distance_sensors` are the sensors of that kind."""
+    sensors = {key.removesuffix("_sensors"): names.pop(key) for key in list(names) if key.endswith("_sensors")}
+    layout = dataclasses.replace(original.layout, sensors={**original.layout.sensors, **sensors}, **names)
+    return with_provenance(original, layout=layout)
 
 
 def only_frames(original: Recording, frames: Any) -> Recording:
@@ -119,7 +123,8 @@ def only_frames(original: Recording, frames: Any) -> Recording:
     return dataclasses.replace(
         original,
         **{name: getattr(original, name)[frames] for name in arrays},
-        **{name: cut(getattr(original, name)) for name in ("collision", "distance", "capacitive")},
+        collision=cut(original.collision),
+        readings={kind: cut(columns) for kind, columns in original.readings.items()},
     )
 
 
@@ -130,7 +135,7 @@ def write(made: Recording, path: Path, *, files: Mapping[str, bytes] | None = No
         BodyView(shape, made.layout.links.index(shape.split("/")[0]), size * TRIANGLES, (200, 200, 210, 255))
         for shape in shapes
     )
-    scene = SceneView(made.provenance.scenario, "", made.layout.links, bodies, (), (), {})
+    scene = SceneView(made.provenance.scenario, "", made.layout.links, bodies, (), {})
     path.parent.mkdir(parents=True, exist_ok=True)
     provenance: Provenance = made.provenance
     writer = McapWriter(path, provenance, scene, made.files if files is None else files, overwrite=True)
@@ -146,8 +151,7 @@ def write(made: Recording, path: Path, *, files: Mapping[str, bytes] | None = No
                 part.joint_velocities,
                 part.link_poses,
                 part.collision,
-                part.distance,
-                part.capacitive,
+                part.readings,
             )
         )
     writer.commit()

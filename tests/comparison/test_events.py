@@ -6,10 +6,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from replay.collision.columns import CollisionColumns
 from replay.comparison.events import Track, _least_shift, match, tracks
-from replay.comparison.signals import COLLISION_FIELDS, INDEX_FIELDS, STATUS_FIELD
+from replay.sensing.distance.columns import DistanceColumns
 
-LEVEL = COLLISION_FIELDS[0]
+LEVEL = CollisionColumns.fields()[0]
+STATUS, SHAPE, TRIANGLE = (DistanceColumns.fields()[k] for k in (0, 5, 6))
 ascending = st.lists(st.integers(0, 60), unique=True, max_size=6).map(sorted)
 
 
@@ -102,7 +104,7 @@ def labels(field, a, b, categories=()):
 def test_levels_are_told_by_threshold():
     assert labels(LEVEL, [0, 1, 2, 2, 0], [0, 0, 2, 2, 0]) == [("overlap of bounds begins", 1, 2)]
     assert labels(LEVEL, [0, 2, 0, 0], [0, 1, 0, 0]) == [("contact begins", 1, -1), ("contact ends", 2, -1)]
-    assert labels(STATUS_FIELD, [1, 1, 2, 1], [1, 2, 2, 1]) == [("too close begins", 2, 1)]
+    assert labels(STATUS, [1, 1, 2, 1], [1, 2, 2, 1]) == [("too close begins", 2, 1)]
 
 
 def test_states_beyond_the_known_ones_are_told_too():
@@ -110,7 +112,7 @@ def test_states_beyond_the_known_ones_are_told_too():
 
 
 def test_categories_are_told_by_the_state_they_become():
-    shape = INDEX_FIELDS[0]
+    shape = SHAPE
     assert labels(shape, [-1, 0, 0, 1], [-1, 0, 1, 1], ("nothing", "a/b", "c/d")) == [("shape becomes c/d", 3, 2)]
-    triangle = INDEX_FIELDS[1]
+    triangle = TRIANGLE
     assert labels(triangle, [-1, 5, 5], [-1, 5, 9]) == [("triangle becomes 9", -1, 2)]

@@ -13,8 +13,7 @@ from tests.comparison import made_up
 FRAMES = 60_000
 LAYOUT = dataclasses.replace(
     made_up.LAYOUT,
-    distance_sensors=tuple(f"d{k:02}" for k in range(18)),
-    capacitive_sensors=tuple(f"c{k}" for k in range(9)),
+    sensors={"distance": tuple(f"d{k:02}" for k in range(18)), "capacitive": tuple(f"c{k}" for k in range(9))},
 )  # with /tf, /joint_states and /collision: 30 topics
 
 MEASURE = """
@@ -33,8 +32,9 @@ def disturb(columns):
     rng = np.random.default_rng(1)
     for field in dataclasses.fields(columns):
         values = getattr(columns, field.name)
-        if dataclasses.is_dataclass(values) and field.name in ("collision", "distance", "capacitive"):
-            disturb(values)
+        if field.name in ("collision", "readings"):
+            for group in values.values() if isinstance(values, dict) else (values,):
+                disturb(group)
         elif field.name == "link_poses":
             values[..., :3, 3] += 1e-6
         elif field.name == "link_quaternions":

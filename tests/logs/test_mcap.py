@@ -141,13 +141,14 @@ def test_chunks_of_several_frames_and_of_frames_without_a_size_are_unpacked() ->
     unsized = streaming.compress(data) + streaming.flush()
     assert zstandard.frame_content_size(unsized) == -1
     several = zstandard.compress(data[:333]) + zstandard.compress(data[333:])
-    for packed in (unsized, several):
-        part = chunk(len(data), packed, crc=0)
+    lz4_parts = [lz4.frame.compress(part, store_size=bool(part)) for part in (data[:5], b"", data[5:700], data[700:])]
+    for packed, kind in ((unsized, "zstd"), (several, "zstd"), (b"".join(lz4_parts), "lz4")):
+        part = chunk(len(data), packed, kind, crc=0)
         with McapLog("frames.mcap", data=ended(HEADER + part)) as log:
             (run,) = [run for part in log.chunks for run in log.runs(part)]
         assert run.messages() == [bytes([k]) * 100 for k in range(9)]
         for wrong in (len(data) - 1, len(data) + 1):
-            part = chunk(wrong, packed, crc=0)
+            part = chunk(wrong, packed, kind, crc=0)
             with pytest.raises(RecordingError, match="does not unpack to the size"):
                 McapLog("frames.mcap", data=ended(HEADER + part))
 

@@ -8,9 +8,13 @@ import numpy as np
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
-from replay.recording.scene_view import BodyView, ConeView, Floats, PlateView, SceneView
-from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.recording.scene_view import BodyView, Floats, SceneView
+from replay.sensing.capacitive import CapacitiveSensor, Plate
+from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.distance import DistanceSensor
+from replay.sensing.distance.columns import DistanceColumns
 from replay.simulation import BLOCK_FRAMES, FrameBlock, Layout
+from tests.recording.synthetic import drawn
 
 LAYOUT = Layout(
     links=("head", "room", "table"),
@@ -18,10 +22,19 @@ LAYOUT = Layout(
     joint_units=("m",),
     shapes=("head/housing", "room/stand", "table/body", "table/top"),
     pairs=("head/housing|table/body", "head/housing|table/top"),
-    distance_sensors=("down",),
-    capacitive_sensors=("guard",),
     objects=("table/body",),
+    sensors={"distance": ("down",), "capacitive": ("guard",)},
 )
+
+
+def _down(x: float, z: float) -> Floats:
+    place = transforms.from_rpy(np.array([np.pi, 0.0, 0.0]))
+    place[:3, 3] = [x, 0.0, z]
+    return place
+
+
+CONE = DistanceSensor("down", 0, _down(0.0, -0.1), np.radians(40), 1.0)
+GUARD = CapacitiveSensor("guard", 0, (Plate("front", _down(0.15, -0.101), np.array([0.05, 0.15])),), 1e-11)
 
 
 def box(size: tuple[float, float, float], center: tuple[float, float, float]) -> Floats:
@@ -49,10 +62,6 @@ def barrel(radius: float, length: float, segments: int = 32) -> Floats:
 def scene() -> SceneView:
     """Return a housing with a sensor and a plate below it, above a barrel on a table."""
     shift = transforms.from_translation(np.array([0.0, 0.0, 0.25]))
-    down = transforms.from_rpy(np.array([np.pi, 0.0, 0.0]))
-    down[:3, 3] = [0.0, 0.0, -0.1]
-    plate = transforms.from_rpy(np.array([np.pi, 0.0, 0.0]))
-    plate[:3, 3] = [0.15, 0.0, -0.101]
     bodies = (
         BodyView("head/housing", 0, box((0.45, 0.45, 0.2), (0, 0, 0)), (222, 226, 230, 255)),
         BodyView("room/stand", 1, box((0.3, 0.3, 1.8), (0, -1.0, 0.9)), (150, 160, 172, 255)),
@@ -64,8 +73,7 @@ def scene() -> SceneView:
         "A housing comes down on a barrel.",
         LAYOUT.links,
         bodies,
-        (ConeView("down", 0, down, np.radians(40), 1.0),),
-        (PlateView("guard", "front", 0, plate, np.array([0.05, 0.15])),),
+        (drawn("distance", CONE), drawn("capacitive", GUARD)),
         {"moving.yaml": "version: 1\nname: moving\n"},
     )
 
@@ -100,22 +108,24 @@ def blocks(frames: int = 300) -> Iterator[FrameBlock]:
             np.zeros((n, 1)),
             poses[s],
             CollisionColumns(level[s], clearance[s], evaluated[s], np.zeros((n, 2), dtype=np.bool_)),
-            DistanceColumns(
-                status=seen[s, None].astype(np.uint8),
-                distance=np.where(seen, np.maximum(gap, 0), np.nan)[s, None],
-                point=point[s],
-                point_sensor=point[s],
-                normal=point[s],
-                shape=np.where(seen, 2, -1)[s, None].astype(np.int32),
-                triangle=np.where(seen, 0, -1)[s, None].astype(np.int32),
-                case=seen[s, None].astype(np.uint8),
-            ),
-            CapacitiveColumns(
-                capacitance=volts[s, None] * 1e-12,
-                per_object=volts[s, None, None] * 1e-12,
-                output_voltage=2.5 - volts[s, None],
-                delta_output=volts[s, None],
-                saturated=np.zeros((n, 1), dtype=np.bool_),
-                touching=contact[s, None],
-            ),
+            {
+                "distance": DistanceColumns(
+                    status=seen[s, None].astype(np.uint8),
+                    distance=np.where(seen, np.maximum(gap, 0), np.nan)[s, None],
+                    point=point[s],
+                    point_sensor=point[s],
+                    normal=point[s],
+                    shape=np.where(seen, 2, -1)[s, None].astype(np.int32),
+                    triangle=np.where(seen, 0, -1)[s, None].astype(np.int32),
+                    case=seen[s, None].astype(np.uint8),
+                ),
+                "capacitive": CapacitiveColumns(
+                    capacitance=volts[s, None] * 1e-12,
+                    per_object=volts[s, None, None] * 1e-12,
+                    output_voltage=2.5 - volts[s, None],
+                    delta_output=volts[s, None],
+                    saturated=np.zeros((n, 1), dtype=np.bool_),
+                    touching=contact[s, None],
+                ),
+            },
         )

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
 from replay.recording import provenance
-from replay.recording.scene_view import BodyView, ConeView, PlateView, SceneView
-from replay.sensing.columns import CapacitiveColumns, DistanceColumns
+from replay.recording.scene_view import BodyView, SceneView, SensorView
+from replay.sensing.capacitive import CapacitiveSensor, Plate
+from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.distance import DistanceSensor
+from replay.sensing.distance.columns import DistanceColumns
+from replay.sensing.kinds import KINDS
 from replay.simulation import BLOCK_FRAMES, FrameBlock, Layout
 
 LAYOUT = Layout(
@@ -19,9 +24,8 @@ LAYOUT = Layout(
     joint_units=("m", "rad"),
     shapes=("arm/beam", "patient/body", "stand/column"),
     pairs=("arm/beam|patient/body", "patient/body|stand/column"),
-    distance_sensors=("left", "right ä"),
-    capacitive_sensors=("guard",),
     objects=("patient/body", "stand/column"),
+    sensors={"distance": ("left", "right ä"), "capacitive": ("guard",)},
 )
 FILES = {"run.yaml": b"version: 1\nname: made_up\n", "parts/body.stl": bytes(range(256)) * 20}
 BOX = np.array(
@@ -35,17 +39,23 @@ BOX = np.array(
 )
 
 
+def drawn(kind: str, sensor: Any) -> SensorView:
+    """Return a sensor as it is drawn."""
+    return SensorView(kind, sensor.name, sensor.link, KINDS[kind].drawing(sensor))
+
+
 def scene() -> SceneView:
     """Return three tetrahedra, a cone each sensor and a plate."""
     bodies = tuple(
         BodyView(name, link, 0.3 * BOX, (200, 200 - 40 * link, 210, 255)) for link, name in enumerate(LAYOUT.shapes)
     )
     cones = tuple(
-        ConeView(name, 0, transforms.from_translation(np.array([0.1 * k, 0.0, 0.0])), 0.6, (1.5, np.inf)[k])
+        DistanceSensor(name, 0, transforms.from_translation(np.array([0.1 * k, 0.0, 0.0])), 0.6, (1.5, np.inf)[k])
         for k, name in enumerate(LAYOUT.distance_sensors)
     )
-    plate = PlateView("guard", "front", 0, transforms.identity(), np.array([0.05, 0.1]))
-    return SceneView("made_up", "tetrahedra", LAYOUT.links, bodies, cones, (plate,), {"run.yaml": "version: 1\n"})
+    guard = CapacitiveSensor("guard", 0, (Plate("front", transforms.identity(), np.array([0.05, 0.1])),), 1e-11)
+    sensors = (*(drawn("distance", cone) for cone in cones), drawn("capacitive", guard))
+    return SceneView("made_up", "tetrahedra", LAYOUT.links, bodies, sensors, {"run.yaml": "version: 1\n"})
 
 
 def blocks(frames: int, *, seed: int = 1, wild: bool = True) -> Iterator[FrameBlock]:
@@ -80,24 +90,26 @@ def _block(rng: np.random.Generator, first: int, n: int, wild: bool) -> FrameBlo
             evaluated=rng.random((n, p)) < 0.5,
             undecided=rng.random((n, p)) < 0.02,
         ),
-        distance=DistanceColumns(
-            status=status,
-            distance=numbers(n, d),
-            point=numbers(n, d, 3),
-            point_sensor=numbers(n, d, 3),
-            normal=numbers(n, d, 3),
-            shape=rng.integers(-1, 3, size=(n, d)).astype(np.int32),
-            triangle=rng.integers(-1, 2**31 - 1, size=(n, d)).astype(np.int32),
-            case=rng.integers(0, 6, size=(n, d)).astype(np.uint8),
-        ),
-        capacitive=CapacitiveColumns(
-            capacitance=numbers(n, c),
-            per_object=numbers(n, c, o),
-            output_voltage=numbers(n, c),
-            delta_output=numbers(n, c),
-            saturated=rng.random((n, c)) < 0.1,
-            touching=rng.random((n, c)) < 0.1,
-        ),
+        readings={
+            "distance": DistanceColumns(
+                status=status,
+                distance=numbers(n, d),
+                point=numbers(n, d, 3),
+                point_sensor=numbers(n, d, 3),
+                normal=numbers(n, d, 3),
+                shape=rng.integers(-1, 3, size=(n, d)).astype(np.int32),
+                triangle=rng.integers(-1, 2**31 - 1, size=(n, d)).astype(np.int32),
+                case=rng.integers(0, 6, size=(n, d)).astype(np.uint8),
+            ),
+            "capacitive": CapacitiveColumns(
+                capacitance=numbers(n, c),
+                per_object=numbers(n, c, o),
+                output_voltage=numbers(n, c),
+                delta_output=numbers(n, c),
+                saturated=rng.random((n, c)) < 0.1,
+                touching=rng.random((n, c)) < 0.1,
+            ),
+        },
     )
 
 

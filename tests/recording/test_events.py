@@ -117,6 +117,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def equal(a: Any, b: Any) -> bool:
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
     if dataclasses.is_dataclass(a):
         return all(equal(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
     return bool(a.tobytes() == b.tobytes() and a.shape == b.shape) if isinstance(a, np.ndarray) else bool(a == b)

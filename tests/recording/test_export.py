@@ -100,7 +100,7 @@ def test_what_cannot_be_exported_is_said(recording: Recording, tmp_path: Path) -
 
 
 def test_a_topic_has_its_own_file_whichever_others_are_wanted(recording: Recording, tmp_path: Path) -> None:
-    layout = dataclasses.replace(recording.layout, distance_sensors=("Tip.1", "tip_1"))
+    layout = dataclasses.replace(recording.layout, sensors={**recording.layout.sensors, "distance": ("Tip.1", "tip_1")})
     provenance = dataclasses.replace(recording.provenance, layout=layout)
     alike = dataclasses.replace(recording, provenance=provenance)
     paths = export(alike, tmp_path, format="csv", topics=["/distance/*"])

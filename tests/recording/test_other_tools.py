@@ -9,7 +9,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from replay.recording import provenance
-from replay.recording.picture import viewer_binary
+from replay.recording.viewer_process import viewer_binary
 from replay.recording.writer import McapWriter
 from tests.recording import moving
 

@@ -69,8 +69,6 @@ def blocks(scene: Scene) -> Iterator[FrameBlock]:
             states.velocities,
             poses.world,
             collision,
-            None,
-            None,
         )
 
 
@@ -131,8 +129,12 @@ def test_the_view_shows_every_shape_cone_and_plate(scene: Scene) -> None:
     bar = shown.bodies[1]
     assert bar.color == (0x10, 0x20, 0x30, 255) and shown.links[bar.link] == "rail"
     assert np.allclose(np.ptp(bar.triangles.reshape(-1, 3), axis=0), [2, 0.1, 0.1])
-    assert [(cone.sensor, cone.range) for cone in shown.cones] == [("ahead", 1.0)]
-    assert [(plate.sensor, plate.name, plate.half_size.tolist()) for plate in shown.plates] == [
-        ("skin", "left", [0.025, 0.1])
-    ]
+    cone, skin = shown.sensors
+    assert (cone.kind, cone.name, skin.kind, skin.name) == ("distance", "ahead", "capacitive", "skin")
+    (outline,) = cone.drawing.outlines
+    rim = outline.strips[-1] - cone.drawing.extent[0]
+    assert outline.name == "" and np.allclose(np.linalg.norm(rim, axis=1), 1.0)
+    left, edges = skin.drawing.outlines
+    assert (left.name, edges.name) == ("left", "outline") and left.face is not None
+    assert np.allclose(np.linalg.norm(np.diff(left.face, axis=0), axis=1), [0.05, 0.2, 0.05])
     assert set(shown.texts) == {"two_boxes.yaml", "parts/sensors.yaml"}

@@ -17,11 +17,13 @@ from rerun.chunk import RrdReader
 from replay.errors import RecordingExistsError, ViewerError
 from replay.numerics import transforms
 from replay.recording.blueprint import eye_of, eye_of_all
-from replay.recording.picture import _cause, picture, viewer_binary
+from replay.recording.picture import _cause, picture
 from replay.recording.rerun_log import LEVEL_COLORS, RerunWriter
 from replay.recording.rerun_scene import extent
 from replay.recording.scene_view import BodyView, indexed
-from replay.recording.surfaces import cone_strips, corner_normals, plate_corners
+from replay.recording.surfaces import corner_normals
+from replay.recording.viewer_process import viewer_binary
+from replay.sensing.distance.kind import cone_strips
 from tests.recording import moving
 
 FRAMES = 300
@@ -156,9 +158,10 @@ def test_the_first_picture_shows_all_bodies_but_the_floor() -> None:
     floor = BodyView("room/floor", 1, sheet, (0, 0, 0, 255))
     nothing = BodyView("room/nothing", 1, np.zeros((0, 3, 3)), (0, 0, 0, 255))
     placed = [transforms.apply(T[body.link], body.triangles).reshape(-1, 3) for body in scene.bodies for T in poses]
-    apexes = [(T[cone.link] @ cone.T_link_sensor)[None, :3, 3] for cone in scene.cones for T in poses]
-    corners = [transforms.apply(T[plate.link], plate_corners(plate)) for plate in scene.plates for T in poses]
-    bare = dataclasses.replace(scene, cones=(), plates=())
+    apexes = [(T[0] @ moving.CONE.T_link_sensor)[None, :3, 3] for T in poses]
+    flat = np.array([[x, y, 0.0] for x in (-0.05, 0.05) for y in (-0.15, 0.15)])
+    corners = [transforms.apply(T[0] @ moving.GUARD.plates[0].T_link_plate, flat) for T in poses]
+    bare = dataclasses.replace(scene, sensors=())
     for view, bodies, points in (
         (scene, (floor, *scene.bodies, nothing), [*placed, *apexes, *corners]),
         (bare, (floor, *scene.bodies, nothing), placed),
@@ -196,7 +199,7 @@ def test_the_first_picture_is_filled_by_what_it_shows(size: tuple[float, float, 
 
 
 def test_cones_have_their_aperture_and_range() -> None:
-    cone = moving.scene().cones[0]
+    cone = moving.CONE
     apex = cone.T_link_sensor[:3, 3]
     axis = cone.T_link_sensor[:3, 2]
     ends = np.concatenate([strip[-1:] for strip in cone_strips(cone)]) - apex

@@ -1,30 +1,41 @@
-"""The compiled message types are those of the `.proto` files."""
+"""The message types are those of the `.proto` files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from grpc_tools import protoc
 
 import replay
+from replay.recording import messages
+from replay.sensing.kinds import KINDS
 
 SCHEMAS = Path(replay.__file__).parents[1] / "schemas"
-COMPILED = Path(replay.__file__).parent / "recording" / "replay.binpb"
+OWN = [messages.COLLISION, *(kind.message for kind in KINDS.values())]
 
 
-def test_the_compiled_types_are_those_of_the_sources(tmp_path: Path) -> None:
-    target = tmp_path / "new.binpb"
-    sources = sorted(path.name for path in SCHEMAS.glob("*.proto"))
-    assert protoc.main(["protoc", f"-I{SCHEMAS}", f"--descriptor_set_out={target}", *sources]) == 0
-    fresh = FileDescriptorSet.FromString(target.read_bytes())
-    shipped = FileDescriptorSet.FromString(COMPILED.read_bytes())
-    assert shipped == fresh, "run `make schemas`"
+def made(name: str) -> FileDescriptorSet:
+    return FileDescriptorSet.FromString(messages.schema(name).data)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_types_are_those_of_the_files(name: str, tmp_path: Path) -> None:
+    target = tmp_path / "compiled.binpb"
+    file = f"{name.removeprefix('replay.')}.proto"
+    assert protoc.main(["protoc", f"-I{SCHEMAS}", f"--descriptor_set_out={target}", file]) == 0
+    assert made(name) == FileDescriptorSet.FromString(target.read_bytes())
+    assert messages.schema(name).data == target.read_bytes(), "the same to the byte, as in recordings of other releases"
+
+
+def test_every_file_is_a_type() -> None:
+    assert sorted(f"replay.{path.stem}" for path in SCHEMAS.glob("*.proto")) == sorted(OWN)
 
 
 def test_field_numbers_stay_what_they_were_in_format_1() -> None:
-    shipped = FileDescriptorSet.FromString(COMPILED.read_bytes())
-    numbers = {m.name: {f.name: f.number for f in m.field} for file in shipped.file for m in file.message_type}
+    files = [file for name in OWN for file in made(name).file]
+    numbers = {m.name: {f.name: f.number for f in m.field} for file in files for m in file.message_type}
     assert numbers == {
         "CollisionStates": {"level": 1, "clearance": 2, "evaluated": 3, "undecided": 4},
         "DistanceReading": {

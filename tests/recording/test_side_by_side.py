@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ from rerun.chunk import RrdReader
 from replay.errors import ViewerError
 from replay.recording.rerun_log import RerunWriter
 from replay.recording.side_by_side import one_recording, side_names
-from replay.recording.viewer import free_port
 from tests.recording import moving
 
 
@@ -79,13 +77,3 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
             pass
     with one_recording([file]) as shown:
         assert shown == file
-
-
-def test_a_second_viewer_for_browsers_finds_a_port() -> None:
-    with socket.socket() as first:
-        first.bind(("127.0.0.1", 0))
-        first.listen()
-        taken = first.getsockname()[1]
-        second = free_port(taken)
-        assert second not in (0, taken)
-    assert free_port(taken) == taken

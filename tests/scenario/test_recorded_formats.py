@@ -13,7 +13,7 @@ from replay.errors import ScenarioError
 from replay.logs.ros_schema import types_of
 from replay.logs.ros_wire import decode_cdr, decode_ros1
 from replay.scenario.notes import notes
-from tests.logs import made_logs
+from tests.logs import made_logs, other_writers
 from tests.logs.made_logs import MESSAGES, ROS, Said
 
 SCENARIO = """
@@ -43,7 +43,25 @@ FORMATS = (
     "csv",
     "csv, semicolons and decimal commas",
     "csv, nanoseconds",
+    "ros1, by mcap_ros1",
+    "cdr, by mcap_ros2",
+    "protobuf, by mcap_protobuf",
+    "bag, by rosbags",
+    "folder by rosbags, sqlite3",
+    "folder by rosbags, mcap",
+    "folder by rosbags, sqlite3, packed by file",
+    "folder by rosbags, sqlite3, packed by message",
+    "csv, quoted tabs",
+    "csv, by pyarrow",
 )
+OTHERS = {
+    "ros1, by mcap_ros1": lambda _, said: other_writers.mcap_ros1(said),
+    "cdr, by mcap_ros2": lambda _, said: other_writers.mcap_ros2(said),
+    "protobuf, by mcap_protobuf": lambda _, said: other_writers.mcap_protobuf(said),
+    "bag, by rosbags": other_writers.rosbag1_bag,
+    "csv, quoted tabs": lambda _, said: other_writers.quoted_tabs(said),
+    "csv, by pyarrow": lambda _, said: other_writers.arrow_csv(said),
+}
 DISORDERS = ("none", "order", "subsets", "repeats", "wraps", "zero stamps", "gap outside", "gap inside", "publishers")
 
 
@@ -89,6 +107,12 @@ def wrapped(said):
 
 def files(folder, kind, said):
     """The files of a log, and what the scenario says of it."""
+    if kind in OTHERS:
+        ending = {"bag": "bag", "csv": "csv"}.get(kind.partition(",")[0], "mcap")
+        return {f"log.{ending}": OTHERS[kind](folder, said)}, f"log.{ending}"
+    if kind.startswith("folder by rosbags, "):
+        parts = other_writers.rosbag2_folder(folder, said, kind.removeprefix("folder by rosbags, "))
+        return {f"drive/{name}": data for name, data in parts.items()}, "drive"
     if kind in MESSAGES:
         return {"log.mcap": made_logs.mcap(said, kind)}, "log.mcap"
     if kind.startswith("db3"):
@@ -163,6 +187,32 @@ def test_a_log_reads_as_its_source_or_is_refused_with_the_true_reason(tmp_path, 
     told = [str(note) for note in notes(scenario)]
     assert any("stamped 0" in note for note in told) == (disorder == "zero stamps"), told
     assert set(scenario.provenance.tracks) == {"swing", "turn", "lift"}
+
+
+@pytest.mark.parametrize("seed", range(64))
+def test_disorders_that_come_together_do_no_harm_either(tmp_path, seed):
+    rng = np.random.default_rng(1000 + seed)
+    kind = FORMATS[seed % len(FORMATS)]
+    ways = {way for way in ("subsets", "gap outside", "zero stamps", "repeats", "order", "wraps") if rng.random() < 0.6}
+    said = source(rng)
+    for way in ("subsets", "gap outside"):
+        said = disordered(said, way, rng) if way in ways else said
+    if "zero stamps" in ways:
+        log, said = disordered(said, "zero stamps", rng), said[3:]
+    else:
+        log = said
+    log = wrapped(log) if "wraps" in ways else log
+    log = disordered(log, "repeats", rng) if "repeats" in ways else log
+    log = disordered(log, "order", rng) if "order" in ways and not kind.startswith("csv") else log
+    tracks = loaded(tmp_path, kind, log).provenance.tracks
+    assert set(tracks) == {"swing", "turn", "lift"}
+    for joint, track in tracks.items():
+        seconds, positions = truth(said, joint)
+        np.testing.assert_array_equal(track.seconds, seconds)
+        if "wraps" in ways and joint == "turn":
+            np.testing.assert_allclose(np.diff(track.positions), np.diff(positions), atol=1e-14)
+        else:
+            np.testing.assert_array_equal(track.positions, positions)
 
 
 @pytest.mark.parametrize("kind", FORMATS)

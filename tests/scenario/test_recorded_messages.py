@@ -54,7 +54,7 @@ def assert_same_track(a, b):
 OTHERS = {  # what tells the second publisher, and the way out
     "channel": ({"channel": 1}, "channels 1, 2; choose one by motion.recorded.channel", "channel: 1"),
     "frame": ({"frame_id": "ghost"}, "frame_id '', 'ghost'; choose one by motion.recorded.frame_id", "frame_id: ''"),
-    "nothing": ({}, "choose one by motion.recorded.channel or frame_id, or", ""),
+    "nothing": ({}, "channel and frame_id do not tell them apart: record one alone", ""),
 }
 
 

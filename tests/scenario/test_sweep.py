@@ -83,7 +83,7 @@ def test_a_list_is_case_by_case_and_may_replace_whole_parts(tmp_path):
         "eye[7]",
     ]
     assert found[0].model.distance.method == "thesis"
-    assert (found[1].model.rtol, found[1].frames) == (1e-3, 21)
+    assert (found[1].model.capacitive.rtol, found[1].frames) == (1e-3, 21)
     assert found[2].sensors.distance["a.b"].aperture == 0.25
     assert found[3].links["wall"].shapes["slab"].type == "sphere"
 

@@ -7,10 +7,11 @@ from replay.collision.columns import CollisionColumns, Level
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_sources
 from replay.scenario.verdict import ExpectationCheck, matching_pairs
-from replay.sensing.columns import CapacitiveColumns, Detection, DistanceColumns
+from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.distance.columns import Detection, DistanceColumns
 
 PAIRS = ("arm/bar|body/skin", "arm/hand|body/skin", "arm/hand|table/top")
-LAYOUT = Layout(("arm", "body", "table"), (), (), (), PAIRS, ("eye",), ("guard",), ())
+LAYOUT = Layout(links=("arm", "body", "table"), pairs=PAIRS, sensors={"distance": ("eye",), "capacitive": ("guard",)})
 SCENARIO = """version: 1
 name: a
 rate: 10
@@ -49,8 +50,10 @@ def outcomes(expectation, *, block=10, clearance="near", margin=0.05):
         check.update(
             TIMES[part],
             CollisionColumns(LEVELS[part], CLEARANCE[part], ~np.isnan(CLEARANCE[part]), never[part]),
-            DistanceColumns(status[part], distance[part], none, none, none, none, none, none),
-            CapacitiveColumns(none, none, output[part], none, output[part] == 0.0, none),
+            {
+                "distance": DistanceColumns(status[part], distance[part], none, none, none, none, none, none),
+                "capacitive": CapacitiveColumns(none, output[part], none, output[part] == 0.0, none, none),
+            },
         )
     return check.finish()
 

@@ -20,7 +20,7 @@ from replay.batch.case import Status
 from replay.batch.run import run_all
 from replay.batch.select import find_scenarios
 from replay.collision.columns import Level
-from replay.sensing.columns import Detection
+from replay.sensing.distance.columns import Detection
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAMES = ("carm_bodyguard", "carm_clear", "carm_head_contact", "carm_near", "carm_parking", "doctor_walks_in")

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from replay.language.units import CAPACITANCE
 from replay.logs.curve_csv import Column, Curve, read_curve
 from replay.scenario.calibration import SensorPath
 from replay.scenario.load import load
-from replay.scenario.units import CAPACITANCE
 from replay.sensing.calibration import Quantity
 
 PICOFARAD = float(CAPACITANCE.units["pF"])

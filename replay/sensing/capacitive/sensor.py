@@ -11,12 +11,11 @@ from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float, as_floats
 from replay.sensing.capacitive.integral import SIDES, check_half_size
+from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
 
 Floats = NDArray[np.float64]
 
 FACES = ("all", "facing")
-VACUUM_PERMITTIVITY = 8.8541878128e-12
-"""[F/m], CODATA 2018."""
 
 
 @dataclass(frozen=True, eq=False)

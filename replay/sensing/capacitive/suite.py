@@ -17,6 +17,7 @@ from replay.numerics.arguments import as_float
 from replay.numerics.jit import entries_of
 from replay.sensing.capacitive import clusters
 from replay.sensing.capacitive.clusters import Clusters, make_clusters
+from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import check_splits
@@ -24,7 +25,6 @@ from replay.sensing.capacitive.plate_inside import plates_inside
 from replay.sensing.capacitive.sensor import CapacitiveSensor
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
-from replay.sensing.columns import CapacitiveColumns
 from replay.sensing.target import Target
 
 Floats = NDArray[np.float64]
@@ -159,6 +159,10 @@ class CapacitiveSuite:
             saturated=np.isinf(capacitance),
             touching=touching,
         )
+
+    def notes(self) -> tuple[str, ...]:
+        """Return nothing: what a reader should know is in the readings."""
+        return ()
 
     def _rounding(self, sensor_index: int, target_index: int, way: Floats) -> Floats:
         """Return how far off places may be (n,) [m], of a way (n,) [m] between the links, see `LinkPoses.way`."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.numerics.jit import record
-from replay.sensing.columns import Detection, DistanceColumns
+from replay.sensing.distance.columns import Detection, DistanceColumns
 from replay.sensing.target import Target
 
 Array = NDArray[np.float64]
@@ -48,20 +48,6 @@ def nothing_yet(frames: int) -> Nearest:
         np.full(frames, -1, dtype=np.int32),
         np.full(frames, -1, dtype=np.int32),
         np.zeros(frames, dtype=np.uint8),
-    )
-
-
-def empty_columns(frames: int, sensors: int) -> DistanceColumns:
-    """Return columns that say that nothing is detected."""
-    return DistanceColumns(
-        status=np.full((frames, sensors), Detection.NOTHING, dtype=np.uint8),
-        distance=np.full((frames, sensors), np.nan),
-        point=np.full((frames, sensors, 3), np.nan),
-        point_sensor=np.full((frames, sensors, 3), np.nan),
-        normal=np.full((frames, sensors, 3), np.nan),
-        shape=np.full((frames, sensors), -1, dtype=np.int32),
-        triangle=np.full((frames, sensors), -1, dtype=np.int32),
-        case=np.zeros((frames, sensors), dtype=np.uint8),
     )
 
 

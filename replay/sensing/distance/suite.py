@@ -18,15 +18,16 @@ from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.numerics.jit import entries_of
-from replay.sensing.columns import DistanceColumns
 from replay.sensing.distance.closest import check_aperture, check_range
+from replay.sensing.distance.columns import DistanceColumns
 from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.counters import DistanceCounters
+from replay.sensing.distance.covered import CoveredSensors
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact, sweep_scan
 from replay.sensing.distance.query import COUNTS
 from replay.sensing.distance.rays import cap_directions, sweep_rays
-from replay.sensing.distance.readings import Nearest, empty_columns, nothing_yet, write_sensor
+from replay.sensing.distance.readings import Nearest, nothing_yet, write_sensor
 from replay.sensing.distance.thesis import sweep_thesis
 from replay.sensing.target import Target
 
@@ -132,6 +133,7 @@ class DistanceSuite:
         self._savings = savings
         self.counters = DistanceCounters()
         self._sweep = self._sweeper(engine)
+        self._covered = CoveredSensors([sensor.name for sensor in sensors], [target.name for target in targets])
         self._frames, self._inside = 0, np.zeros((len(self.sensors), len(self.targets)), dtype=np.int64)
 
     def run(self, poses: LinkPoses) -> DistanceColumns:
@@ -144,7 +146,7 @@ class DistanceSuite:
             Columns (n, D), in the order of the sensors given. "rays" has no case: its `case` is 0.
         """
         frames = len(poses.local)
-        columns = empty_columns(frames, len(self.sensors))
+        columns = DistanceColumns.nothing(frames, len(self.sensors))
         relative: dict[tuple[int, int], Array] = {}
         way: dict[tuple[int, int], Array] = {}
         for column, sensor in enumerate(self.sensors):
@@ -170,15 +172,18 @@ class DistanceSuite:
             write_sensor(columns, column, nearest, self.targets, T_target_sensor, poses, sensor.min_range)
             self._count_inside(column, nearest, T_target_sensor)
         self._frames += frames
+        if frames:
+            self._covered.update(columns)
         return columns
 
     def notes(self) -> tuple[str, ...]:
-        """Return a line for each sensor and each body that its apex was inside of, on no face, in frames so far."""
-        return tuple(
+        """Return a line for each sensor that a body touched in all frames so far, or whose apex was inside of one."""
+        inside = (
             f"distance sensor {self.sensors[s].name!r} is inside {self.targets[t].name} in {self._inside[s, t]} of "
             f"{count(self._frames, 'frame')}; it reads the surface around it, from within"
             for s, t in np.argwhere(self._inside).tolist()
         )
+        return *self._covered.notes(), *inside
 
     def _count_inside(self, column: int, nearest: Nearest, T_target_sensor: dict[int, Array]) -> None:
         for index, pose in T_target_sensor.items():

@@ -1,6 +1,7 @@
 """Kernels compiled by the way into numba and by its public decorator: the same results, and each where it belongs."""
 
 import gc
+import re
 
 import numba
 import numpy as np
@@ -8,7 +9,11 @@ import pytest
 from numba import float64, njit
 from numba.core.targetconfig import TargetConfig
 
+from replay.geometry.surface_boxes import BOX
+from replay.geometry.wide_tree import LANES
 from replay.numerics.jit import compiler, kernel, leaf_kernel
+from replay.sensing.distance.bounds import box_bounds
+from replay.sensing.distance.cone import Cone
 
 FAKED = "import numba\nnumba.__version__ = '0.99.0'\n"
 
@@ -79,6 +84,20 @@ def test_constants_among_arguments_make_no_specialisations(tmp_path, monkeypatch
 
     assert powers(2.0) == 14.0
     assert len(power._lowered) == 1
+
+
+def test_loops_of_what_a_kernel_calls_become_vectors(tmp_path, monkeypatch):
+    monkeypatch.setattr("replay.numerics.jit.store.directory", lambda: tmp_path)  # from a file it would have no code
+
+    @kernel
+    def bounded(boxes, cone, bounds):
+        box_bounds(boxes, (0.0, 0.0, 0.0), cone, 0.0, bounds)
+
+    bounds = np.empty(LANES)
+    bounded(np.ones(BOX * LANES, dtype=np.float32), Cone(0.0, 0.0, 1.0, 0.8, 0.6, 0.0), bounds)
+    (compiled,) = bounded.overloads.values()
+    code = str(compiled.library._final_module)
+    assert re.search(r"fmul <\d+ x (float|double)>", code), "a walk of the distance sensor's tree takes twice as long"
 
 
 def test_functions_that_are_no_kernels_can_call_kernels():

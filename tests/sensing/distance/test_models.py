@@ -9,8 +9,8 @@ import pytest
 from replay.errors import MissingPackageError
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.numerics import transforms
-from replay.sensing.columns import Detection
 from replay.sensing.distance import DistanceSensor, DistanceSuite
+from replay.sensing.distance.columns import Detection
 from replay.sensing.distance.rays import cap_directions
 from replay.sensing.target import make_target
 from tests.sensing.distance.cone_families import FAMILIES

@@ -9,8 +9,8 @@ import pytest
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.numerics import transforms
-from replay.sensing.columns import Detection
 from replay.sensing.distance import DistanceSensor, DistanceSuite, closest_in_cone
+from replay.sensing.distance.columns import Detection
 from replay.sensing.target import make_target
 from tests.sensing.distance.meshes import grid_of_cubes, torus
 

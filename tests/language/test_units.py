@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from replay.scenario.units import DIMENSIONS, JointPosition, Length, Quantity, Range
+from replay.language.units import DIMENSIONS, JointPosition, Length, Quantity, Range
 
 DECIMALS = st.decimals(allow_nan=False, allow_infinity=False, places=6, min_value=-(10**9), max_value=10**9)
 # an independent table: powers of ten as text, and pi from mpmath

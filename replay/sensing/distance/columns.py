@@ -1,17 +1,19 @@
-"""What the sensors say of n frames, as columns."""
+"""What distance sensors say of n frames."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.columns import Columns, Field
+
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int32]
-Flags = NDArray[np.bool_]
 
 
 class Detection(enum.IntEnum):
@@ -23,7 +25,7 @@ class Detection(enum.IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class DistanceColumns:
+class DistanceColumns(Columns):
     """Readings of D distance sensors in n frames.
 
     Attributes:
@@ -37,32 +39,11 @@ class DistanceColumns:
         case: (n, D) uint8, the thesis's case 1..5, 0 when nothing is detected.
     """
 
-    status: Bytes
-    distance: Floats
-    point: Floats
-    point_sensor: Floats
-    normal: Floats
-    shape: Integers
-    triangle: Integers
-    case: Bytes
-
-
-@dataclass(frozen=True, eq=False)
-class CapacitiveColumns:
-    """Readings of C capacitive sensors in n frames.
-
-    Attributes:
-        capacitance: (n, C) [F], inf when saturated: the sum of per_object and the sensor's stray capacitance.
-        per_object: (n, C, O) [F], what each sensed shape contributes; 0 for shapes the sensor ignores.
-        output_voltage: (n, C) [V]; 0 when saturated.
-        delta_output: (n, C) [V], supply minus output voltage.
-        saturated: (n, C) bool, the integral is infinite, or a plate is in a sensed body, or flush and facing into it.
-        touching: (n, C) bool, a sensed shape and a plate have a point in common.
-    """
-
-    capacitance: Floats
-    per_object: Floats
-    output_voltage: Floats
-    delta_output: Floats
-    saturated: Flags
-    touching: Flags
+    status: Annotated[Bytes, Field(states=Detection, open=(1, 2), events={"detection": 2, "too close": 3})]
+    distance: Annotated[Floats, Field(unit="m", gate="status", chart="Distance to the closest point [m]")]
+    point: Annotated[Floats, Field(unit="m", gate="status", label="point in world", letters="xyz", beam=True)]
+    point_sensor: Annotated[Floats, Field(unit="m", gate="status", label="point in sensor", letters="xyz")]
+    normal: Annotated[Floats, Field(gate="status", label="normal in world", letters="xyz")]
+    shape: Annotated[Integers, Field(gate="status", names="shapes")]
+    triangle: Annotated[Integers, Field(gate="status", most=2**31 - 1)]
+    case: Annotated[Bytes, Field(gate="status", most=5)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 
-from replay.scenario.node import Node
+from replay.language.node import Node
 
 _HEAD = re.compile(r"[-+]?[0-9]+")
 _TAIL = re.compile(r"[0-9]+(?:[eE][-+]?[0-9]+)?(?:\s*[^\s,:]{1,10})?")

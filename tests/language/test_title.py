@@ -3,7 +3,7 @@
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from replay.scenario.fields import Title
+from replay.language.fields import Title
 
 TITLE = TypeAdapter(Title)
 

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
-from replay.scenario import decimal_comma
+from replay.language import decimal_comma
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749446, 10**61)
 _DEGREE = _PI / 180

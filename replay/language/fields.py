@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -18,7 +20,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from replay.scenario.units import Angle, Length, Number, Size
+from replay.language.units import Angle, Length, Number, Size
+from replay.numerics import transforms
 
 
 class Part(BaseModel):
@@ -115,6 +118,15 @@ class Placement(Part):
             raise rejected("and rpy both give the rotation; keep one of the two", at=("quat_xyzw",))
         return self
 
+    def transform(self) -> NDArray[np.float64]:
+        """Return this as a transform (4, 4) into the frame that it is given in."""
+        if self.quat_xyzw is not None:
+            T = transforms.from_quaternion(np.array(self.quat_xyzw))
+        else:
+            T = transforms.from_rpy(np.array(self.rpy or (0.0, 0.0, 0.0)))
+        T[:3, 3] = self.xyz
+        return T
+
 
 class Pose(Placement):
     """Where something stands in the frame of what carries it; the default is the same place."""
@@ -122,3 +134,18 @@ class Pose(Placement):
 
 Size2 = tuple[Size, Size]
 Size3 = tuple[Size, Size, Size]
+
+When = Literal["never", "always", "sometimes"]
+"""In no frame, in every frame, in at least one."""
+
+
+def needs_one(part: Part, *keys: str) -> None:
+    """Refuse an expectation that says nothing."""
+    if all(getattr(part, key) is None for key in keys):
+        raise rejected(f"expects nothing; add one of {', '.join(keys)}")
+
+
+def in_order(low: float | None, high: float | None, unit: str) -> None:
+    """Refuse bounds between which there is nothing."""
+    if low is not None and high is not None and low > high:
+        raise rejected(f"must not be below min, {low:.6g} {unit}", at=("max",))

@@ -1,0 +1,37 @@
+"""What capacitive sensors say of n frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.numerics.columns import Columns, Field
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_CHART = "Capacitive sensors: drop of the output voltage [V]"
+
+
+@dataclass(frozen=True, eq=False)
+class CapacitiveColumns(Columns):
+    """Readings of C capacitive sensors in n frames.
+
+    Attributes:
+        capacitance: (n, C) [F], inf when saturated: the sum of per_object and the sensor's stray capacitance.
+        output_voltage: (n, C) [V]; 0 when saturated.
+        delta_output: (n, C) [V], supply minus output voltage.
+        saturated: (n, C) bool, the integral is infinite, or a plate is in a sensed body, or flush and facing into it.
+        touching: (n, C) bool, a sensed shape and a plate have a point in common.
+        per_object: (n, C, O) [F], what each sensed shape contributes; 0 for shapes the sensor ignores.
+    """
+
+    capacitance: Annotated[Floats, Field(unit="F", gate="saturated")]
+    output_voltage: Annotated[Floats, Field(unit="V", gate="saturated")]
+    delta_output: Annotated[Floats, Field(unit="V", gate="saturated", chart=_CHART)]
+    saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
+    touching: Annotated[Flags, Field(begins=("touch",))]
+    per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]

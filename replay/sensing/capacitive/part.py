@@ -1,0 +1,104 @@
+"""Capacitive sensors as they are written: the sensor, its methods, what can be expected of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, StrictInt, model_validator
+
+from replay.language.fields import Glob, Name, Part, Pose, Size2, When, in_order, needs_one
+from replay.language.units import NUMBER, Capacitance, Permittivity, Quantity, StrayCapacitance, Supply, Voltage
+from replay.sensing.kind import Method
+
+Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below=1.0)]
+
+VACUUM_PERMITTIVITY = 8.8541878128e-12
+"""[F/m], CODATA 2018."""
+
+
+class Plate(Part):
+    """A rectangular plate, in the xy plane of its pose, centred at the origin; its front faces +z."""
+
+    pose: Pose = Pose()
+    """Where the plate stands in the sensor's link's frame."""
+    size: Size2
+    """Edge lengths along x and y [m]."""
+
+
+class CapacitiveSensor(Part):
+    """Reads the capacitance between its plates and everything it senses, through a voltage divider."""
+
+    link: Name
+    """The link that carries the plates."""
+    plates: Annotated[dict[Name, Plate], Field(min_length=1)]
+    """Plates by name; their capacitances add up."""
+    coupling: Capacitance
+    """Coupling capacitance of the voltage divider [F]."""
+    permittivity: Permittivity = VACUUM_PERMITTIVITY
+    """[F/m]; a fitted number, see METHODS 4.3."""
+    stray_capacitance: StrayCapacitance = 0.0
+    """What the sensor reads while nothing is near [F]: cables and its own surroundings; added to what is sensed."""
+    supply: Supply = 2.5
+    """Supply voltage [V]."""
+    side: Literal["front", "both"] = "front"
+    """"front" counts only what lies on the plates' +z side."""
+    faces: Literal["all", "facing"] = "all"
+    """"facing" counts only triangles whose outside faces the plate."""
+    ignore: tuple[Glob, ...] = ()
+    """Patterns of the names of links that are not sensed; the sensor's own link never is."""
+
+
+class CapacitiveMethod(Method):
+    """How capacitive sensors are computed."""
+
+    method: Literal["tree", "exact", "midpoint"] = "tree"
+    """A tree that meets a tolerance, every triangle in closed form, or the thesis's midpoint splitting."""
+    rtol: Tolerance | None = None
+    """Relative tolerance of the sum; only for method tree, 1e-6 when left out."""
+    splits: Annotated[StrictInt, Field(ge=0, le=8)] | None = None
+    """Each triangle is split into 4^splits; only for method midpoint, 4 when left out."""
+
+    @model_validator(mode="after")
+    def _options_belong(self) -> Self:
+        self._belongs("tree", "rtol")
+        self._belongs("midpoint", "splits")
+        return self
+
+    def options(self) -> dict[str, Any]:
+        """See `Method`."""
+        if self.method == "tree":
+            return {"rtol": 1e-6 if self.rtol is None else self.rtol}
+        if self.method == "midpoint":
+            return {"splits": 4 if self.splits is None else self.splits}
+        return {}
+
+
+class OutputBounds(Part):
+    """Bounds of an output voltage."""
+
+    min: Voltage | None = None
+    """No output is below this one [V]."""
+    max: Voltage | None = None
+    """No output is above this one [V]."""
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        needs_one(self, "min", "max")
+        in_order(self.min, self.max, "V")
+        return self
+
+
+class CapacitiveExpectation(Part):
+    """What a capacitive sensor reads."""
+
+    capacitive: Name
+    """Name of the capacitive sensor."""
+    output: OutputBounds | None = None
+    """Bounds of the output voltage."""
+    saturated: When | None = None
+    """Whether the capacitance is infinite."""
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        needs_one(self, "output", "saturated")
+        return self

@@ -1,0 +1,163 @@
+"""What the house knows of a kind of sensor: one description, which every room loops over.
+
+A kind is a folder of this room with a `SensorKind` in it, and a line in `kinds`. Its YAML part, its methods, how it is
+computed, drawn and charted, and the table of what it reads stand there; nothing else in the house names it. Modules
+that a description imports at their top must be light: `replay validate` loads them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.language.fields import Part, rejected
+from replay.numerics.columns import Columns
+
+if TYPE_CHECKING:
+    from replay.kinematics.linkage import LinkPoses
+    from replay.sensing.target import Target
+
+Floats = NDArray[np.float64]
+Color = tuple[int, int, int, int]
+"""Red, green, blue and opacity, 0 to 255."""
+
+
+class Method(Part):
+    """How sensors of a kind are computed, as it is written in a model; options that are left out are None."""
+
+    method: str
+
+    def options(self) -> dict[str, Any]:
+        """Return the options that have an effect with this method, those left out as they are then."""
+        return {}
+
+    def _belongs(self, needed: str, *keys: str) -> None:
+        """Refuse options that have no effect."""
+        for key in keys:
+            if getattr(self, key) is not None and self.method != needed:
+                rule = f"has no effect with method {self.method}; it belongs to method {needed}"
+                raise rejected(rule, at=(key,))
+
+
+class Suite(Protocol):
+    """All sensors of a kind in a scene."""
+
+    def run(self, poses: LinkPoses) -> Columns:
+        """Return their readings in all frames of a block."""
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what a reader should know of the frames so far, one line each."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What can be expected of a reading: bounds of a number, or in how many frames something is so.
+
+    Attributes:
+        what: as in "largest distance 2 m", "detected in no frame"; the key of an expectation that holds the word
+            ("never"), or the mapping with `min` and `max`.
+        values: takes the columns, returns (n, S): NaN is no value; something is so where it is above 0.
+        unit: of bounds; "" for what is so or not.
+        inside: False for bounds that are keys of the expectation itself.
+    """
+
+    what: str
+    values: Callable[[Any], NDArray[Any]]
+    unit: str = ""
+    inside: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A part of a drawn sensor, in its link's frame [m].
+
+    Attributes:
+        name: of the part; "" for the sensor itself.
+        strips: line strips (k, 3).
+        color: of the lines, and of the face; `width` of the lines, in pixels.
+        face: (4, 3), corners of a rectangle that is filled, counter-clockwise seen from its front; drawn instead of
+            strips.
+    """
+
+    name: str
+    color: Color
+    strips: tuple[Floats, ...] = ()
+    width: float = 1.0
+    face: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """How a sensor is drawn.
+
+    Attributes:
+        outlines: its parts.
+        extent: (k, 3) [m] points in its link's frame that the first picture shows; a `beam` begins at the first.
+    """
+
+    outlines: tuple[Outline, ...]
+    extent: Floats
+
+
+class SensorKind(ABC):
+    """A kind of sensor.
+
+    Attributes:
+        name: key of its sensors, methods and expectations in YAML; begins its topics, `/name/<sensor>`, and names its
+            group of columns, `block.name`, and of sensors, `layout.name_sensors`.
+        part: a sensor as it is written; `link` and `ignore` are among its keys.
+        method: its methods as they are written.
+        revisions: of each method; raised when its results change beyond the shipped rules, recorded with every result.
+        models: its method in built-in models, by their names.
+        expectation: what can be expected, as it is written; the key `name` names the sensor.
+        expected: the same, as what is taken from the columns.
+        columns: what it reads: (n, S, ...) of n frames and S sensors. A field keeps its place, which is its number in
+            messages; a new one is the last.
+    """
+
+    name: str
+    part: type[Part]
+    method: type[Method]
+    revisions: ClassVar[Mapping[str, int]]
+    models: ClassVar[Mapping[str, Method]] = {}
+    expectation: type[Part]
+    expected: Sequence[Expected]
+    columns: type[Columns]
+
+    @property
+    def message(self) -> str:
+        """Name of its message type."""
+        return f"replay.{self.name.title().replace('_', '')}Reading"
+
+    def topic(self, sensor: str) -> str:
+        """Return the topic of a sensor."""
+        return f"/{self.name}/{sensor}"
+
+    @abstractmethod
+    def sensor(self, name: str, part: Any, link: int, ignored_links: frozenset[int]) -> Any:
+        """Return a sensor of how it is written, on a link by its index; it has a `name` and a `link`."""
+
+    @abstractmethod
+    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Any, *, savings: bool) -> Suite:
+        """Return the sensors of a scene; see `simulation.simulate` for `savings`.
+
+        Raises:
+            MissingPackageError: the method names an engine that is not installed.
+        """
+
+    @abstractmethod
+    def kernels(self, method: Any, *, savings: bool) -> tuple[Any, ...]:
+        """Return the kernels that such a suite calls."""
+
+    @abstractmethod
+    def drawing(self, sensor: Any) -> Drawing:
+        """Return how a sensor is drawn."""
+
+    @abstractmethod
+    def cost(self, part: Any, triangles: int) -> float:
+        """Return about how long a frame of a sensor takes before so many triangles; 1 is a pair that is not near."""

@@ -1,0 +1,89 @@
+"""What holds while damaged input is read: no foreign file or address is opened, nothing hangs, memory stays bounded."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import resource
+import signal
+import site
+import sys
+import sysconfig
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+
+import replay
+
+LONGEST = 20.0
+"""Longest time [s] of one input."""
+MOST = 2 << 30
+"""Most resident memory [bytes] of the process."""
+_OWN = (
+    tempfile.gettempdir(),
+    "/dev/null",
+    "/proc/self",
+    "/sys/",
+    "/usr/share",
+    "/etc/",
+    *map(str, (Path(replay.__file__).parents[1], *site.getsitepackages())),
+    *sysconfig.get_paths().values(),
+    sys.prefix,
+    sys.base_prefix,
+)
+"""Where files may be opened: what a test writes, and what Python and its libraries load."""
+_PROCESSES = re.compile(r"subprocess\.|os\.(system|exec|spawn|posix_spawn|fork|startfile)|pty\.|socket\.(?!__new__)")
+
+_foreign: list[str] = []
+_watching: list[bool] = []
+
+
+def _hook(event: str, arguments: tuple[object, ...]) -> None:
+    if not _watching:
+        return
+    if event == "open" and isinstance(arguments[0], str | bytes):
+        path = arguments[0].decode(errors="replace") if isinstance(arguments[0], bytes) else arguments[0]
+        if path.startswith("/") and not path.startswith(_OWN):
+            _foreign.append(f"open {path}")
+    elif _PROCESSES.match(event):
+        _foreign.append(event)
+
+
+class Hang(BaseException):
+    """One input took too long; no handler of errors may swallow it."""
+
+
+def _late(signum: int, frame: FrameType | None) -> None:
+    raise Hang(f"longer than {LONGEST:g} s")
+
+
+def install() -> None:
+    """Begin to listen; hooks cannot be taken away again, so that this does nothing between watches."""
+    if not getattr(install, "done", False):
+        sys.addaudithook(_hook)
+        install.done = True
+
+
+@contextlib.contextmanager
+def watched() -> Iterator[None]:
+    """Raise AssertionError for what was opened inside, Hang for what takes too long, MemoryError for what grows."""
+    before = signal.signal(signal.SIGALRM, _late)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    begin, peak = time.monotonic(), _peak()
+    _foreign.clear()
+    _watching.append(True)
+    try:
+        yield
+    finally:
+        _watching.clear()
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert not _foreign, f"opened: {_foreign}"
+    assert time.monotonic() - begin < LONGEST, "took too long in native code"
+    assert _peak() < MOST or _peak() == peak, f"memory rose to {_peak() / 2**20:.0f} MiB"
+
+
+def _peak() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
