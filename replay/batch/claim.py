@@ -16,10 +16,14 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import psutil
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from replay.errors import BusyError
+from replay.json_text import read_json, typed
 from replay.logs.file_lock import is_at, lock
 from replay.logs.part_file import refuse_link, write_error
 
@@ -27,6 +31,14 @@ LOCK = ".lock"
 _SECONDS_OF_DYING = 15.0
 """As long is waited for the workers of a process that is gone."""
 _PAUSE = 0.02
+
+
+class Signature(TypedDict):
+    """What the lock's file says of who has it."""
+
+    process: Annotated[int, Field(gt=0, lt=1 << 31)]
+    host: str
+    since: str
 
 
 @dataclass(frozen=True)
@@ -137,13 +149,13 @@ def _user(handle: int) -> tuple[str, bool]:
     for _ in range(10):  # it may be about to sign
         try:
             os.lseek(handle, 0, os.SEEK_SET)
-            signed = json.loads(os.read(handle, 4096))
-            number, host, since = int(signed["process"]), str(signed["host"]), str(signed["since"])
+            signed = typed(read_json(os.read(handle, 4096)), Signature)
             break
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError):
             time.sleep(_PAUSE)
     else:
         return "another process", True
+    number, host, since = signed["process"], signed["host"], signed["since"]
     if host != platform.node():
         return f"process {number} on {host} since {since}", True
     if _lives(number):

@@ -19,11 +19,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import Any, TypeVar
 
 import psutil
 
+from replay.batch.import_path import import_path
 from replay.batch.memory import Peak
 from replay.batch.task import Ended, Ending, Task
 from replay.batch.worker import (
@@ -297,24 +297,6 @@ class _Worker:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=5.0)  # so that its exit code is its own and not that of `stop`
         inbox.put((self, None))
-
-
-def import_path(work: Work) -> list[str]:
-    """Return where workers look for modules: where this process does, but for the current folder.
-
-    Whatever lies in the folder that a command is called in, such as a json.py, is none of its business. The folder that
-    this package, or the work, has been imported from stays, as for a checkout that is the current folder.
-    """
-    homes: set[str] = set()
-    for name in ("replay", work.__module__):
-        module = sys.modules[name.partition(".")[0]]
-        places = getattr(module, "__path__", None) or [getattr(module, "__file__", None)]
-        homes.update(os.path.realpath(Path(place).parent) for place in places if place)
-    with contextlib.suppress(OSError):  # the current folder may be gone
-        here = os.path.realpath(Path.cwd())
-        found = [here if folder == "" else folder for folder in sys.path]
-        return [folder for folder in found if os.path.realpath(folder) != here or here in homes]
-    return [folder for folder in sys.path if folder]
 
 
 def _above(used: int, memory: int) -> str:

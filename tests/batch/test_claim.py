@@ -154,6 +154,23 @@ def test_a_folder_that_was_made_and_is_not_used_goes_again(tmp_path):
         pass
 
 
+ODD = [
+    "",
+    "[" * 4000,
+    "[]",
+    '{"process": -5, "host": "x", "since": "y"}',
+    '{"process": %s, "host": "", "since": ""}' % ("9" * 4000),
+]
+
+
+@pytest.mark.parametrize("text", ODD, ids=range(len(ODD)))
+def test_a_lock_that_says_anything_names_nobody(tmp_path, text):
+    with holder(tmp_path):
+        (tmp_path / LOCK).write_text(text)
+        with pytest.raises(BusyError, match="in use by another process; wait"), claim(tmp_path):
+            pass
+
+
 def test_the_lock_is_never_written_through_a_link(tmp_path):
     (tmp_path / "precious").write_text("text")
     (tmp_path / "out").mkdir()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import replay
-from replay.batch.pool import import_path
+from replay.batch.import_path import import_path
 from tests.batch import scenes
 from tests.batch.tasks import behave
 

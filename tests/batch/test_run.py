@@ -189,7 +189,7 @@ def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path, monkeypatch)
             raise NoSpaceError(str(path), "No space left on device")
         return write_file(path, data)
 
-    monkeypatch.setattr("replay.batch.run.write_file", full)
+    monkeypatch.setattr("replay.batch.case_folder.write_file", full)
     with pytest.raises(NoSpaceError):
         run_all([scenes.scene("good"), scenes.scene("other")], tmp_path, rrd=False, execution=TWO)
     assert json.loads((tmp_path / "run.json").read_text())["interrupted"] is True
