@@ -293,7 +293,7 @@ PLY = (
             lambda: PLY.format(1, "int").encode() + bytes(36) + struct.pack("<i3i", 2**31 - 1, 0, 1, 2),
             "ends before",
         ),
-        ("a.ply", lambda: PLY.format(10**18, "uchar").encode() + bytes(36), "announces"),
+        ("a.ply", lambda: PLY.format(10**17, "uchar").encode() + bytes(36), "announces"),
         (
             "a.ply",
             lambda: b"ply\nformat ascii 1.0\nelement x 5000000\nend_header\n" + b"1\n" * 5_000_000,
