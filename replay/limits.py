@@ -3,7 +3,7 @@
 A bound is on work and not only on bytes: a file of a few kilobytes can stand for terabytes, for 10^12 messages or for
 fields within fields without end. What is beyond a bound is refused in one line that names it (exit code 2), within
 seconds and 2 GiB of memory. What grows in step with the file itself is allowed: a bound that follows the file's size
-says so. `README.md` shows this table, and a test keeps the two the same.
+says so. `README.md` shows the main ones, and a test keeps the two the same.
 """
 
 from __future__ import annotations
@@ -28,6 +28,10 @@ YAML_TOTAL: Final = 2 * MIB
 """Bytes of a scenario's YAML files together."""
 YAML_NODES: Final = 100_000
 """Keys and values of one YAML file, with every alias written out."""
+BAG_YAML: Final = 64 << 10
+"""Bytes of the metadata.yaml of a bag's folder."""
+BAG_FILES: Final = 1_000
+"""Files of a bag's folder."""
 YAML_DEPTH: Final = 40
 """Collections within collections; the language itself needs 8."""
 YAML_TAG: Final = 1_000
@@ -68,8 +72,10 @@ CHANNELS: Final = 10_000
 """Channels of a log."""
 SCHEMA_FIELDS: Final = 10_000
 """Fields of a message type, with those of the messages in it."""
-DEFINITION_TEXT: Final = 256 << 10
+DEFINITION_TEXT: Final = 128 << 10
 """Bytes of a ROS message definition."""
+DEFINITION_STEPS: Final = 300_000
+"""Steps of parsing an IDL definition, whose number may double with each type within a type."""
 MESSAGE: Final = 16 * MIB
 """Bytes of a message that is taken apart into values; a larger one is exported as bytes."""
 MESSAGE_VALUES: Final = 1_000_000
@@ -133,8 +139,18 @@ def visits(size: int) -> int:
 
 
 def records(size: int) -> int:
-    """Return how many records a log of `size` bytes may have, messages among them: 2 million, or one a 16 bytes."""
+    """Return how many records a log of `size` bytes may have in its chunks: 2 million, or one for each 16 bytes."""
     return max(2_000_000, size // 16)
+
+
+def loose_records(size: int) -> int:
+    """Return how many records a log of `size` bytes may have outside chunks: 500 000, or one for each 32 bytes."""
+    return max(500_000, size // 32)
+
+
+def decoded(size: int) -> int:
+    """Return how many messages of a log of `size` bytes are taken apart: 200 000, or one for each 8 bytes."""
+    return max(200_000, size // 8)
 
 
 def reads(size: int) -> int:

@@ -89,7 +89,7 @@ def _by_trimesh(name: str, kind: str, data: bytes) -> Any:
 
     if b"\0" not in data:  # text, whose names and comments may be in any encoding
         data = data.decode(errors="replace").encode()
-    log = logging.getLogger("trimesh")  # it tells of its attempts with tracebacks
+    log = logging.getLogger("trimesh.util")  # it tells of its attempts with tracebacks
     told, log.disabled = log.disabled, True
     try:
         with warnings.catch_warnings():  # trimesh's own doubts become ours through the checks of the mesh

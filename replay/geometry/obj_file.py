@@ -59,17 +59,19 @@ class _TooMany(ValueError):
 
 def _lines(data: bytes) -> Iterator[tuple[int, str]]:
     """Yield the lines with vertices and faces, and their numbers; one that ends in a backslash goes on below."""
-    begun = b""
-    number = 0
+    parts: list[bytes] = []
+    number = size = 0
     for raw in io.BytesIO(data):
         line = raw.rstrip(b"\r\n")
-        number += not begun
+        number += not parts
         if line.endswith(b"\\"):
-            begun += line[:-1] + b" "
-            if len(begun) > limits.OBJ_LINE:
+            parts.append(line[:-1])
+            size += len(line)
+            if size > limits.OBJ_LINE:
                 raise ValueError(f"line {number} has more than {limits.OBJ_LINE} characters")
             continue
-        whole, begun = begun + line, b""
+        whole = b" ".join([*parts, line])
+        parts, size = [], 0
         if whole.lstrip()[:1] in (b"v", b"f"):
             yield number, whole.decode(errors="replace")  # comments and names may be in any encoding
 

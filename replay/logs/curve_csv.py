@@ -176,7 +176,7 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
         raise CurveError(str(path), line, f"{name} is missing")
     number = _number(cell)
     if number is None:
-        raise CurveError(str(path), line, f"{name} = {cell!r} is not a number")
+        raise CurveError(str(path), line, f"{name} = {cell[:60]!r} is not a number")
     if not math.isfinite(number):
-        raise CurveError(str(path), line, f"{name} = {cell} is not finite")
+        raise CurveError(str(path), line, f"{name} = {cell[:60]} is not finite")
     return number + 0.0

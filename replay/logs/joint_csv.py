@@ -134,9 +134,9 @@ class _Log:
                         raise RecordingError(self._name, self._no_number(index, self._table.time, cell))
                     time, kind = date[0], "with" if date[1] else "without"
             except OverflowError:
-                raise RecordingError(self._name, f"{self._place(index)}: {cell} is beyond 146 years") from None
+                raise RecordingError(self._name, f"{self._place(index)}: {cell[:60]} is beyond 146 years") from None
             except ValueError as error:
-                raise RecordingError(self._name, f"{self._place(index)}: {cell!r} is no date: {error}") from None
+                raise RecordingError(self._name, f"{self._place(index)}: {cell[:60]!r} is no date: {error}") from None
             times.append(time)
             zones.add(kind)
             if len(zones) > 1:
@@ -152,7 +152,7 @@ class _Log:
         return f"line {self._table.lines[index]}, column {self._table.time!r}"
 
     def _no_number(self, index: int, heading: str, cell: str) -> str:
-        rule = f"line {self._table.lines[index]}, column {heading!r}: {cell!r} is not a finite number"
+        rule = f"line {self._table.lines[index]}, column {heading!r}: {cell[:60]!r} is not a finite number"
         if heading == self._table.time and _DATE_LIKE.match(cell):
             return f"{rule} or a date such as 2024-05-01T12:00:00.5Z"
         if "," in cell and "." in cell:

@@ -64,6 +64,7 @@ class McapLog:
         preamble_holds: whether everything before the first chunk is there and as `replay` wrote it; it decides where
             the data section has no end, and so no checksum. A file that another tool has written anew says no.
         loss: what was lost when the file was salvaged, else None.
+        work: what reading it has cost, held against its bounds.
     """
 
     def __init__(self, path: str | Path, *, salvage: bool = False, data: bytes | None = None) -> None:
@@ -105,7 +106,7 @@ class McapLog:
         self.message_counts: dict[int, int] | None = None
         self.preamble_holds = False
         self.loss: Loss | None = None
-        self._work = Work(self._file, self._size)
+        self.work = Work(self._file, self._size)
         self._defined: set[bytes] = set()
 
     def _open(self) -> None:
@@ -127,19 +128,9 @@ class McapLog:
         return self._bytes_at(attachment.begin, attachment.size)
 
     @property
-    def most_records(self) -> int:
-        """How many records a file of its size may have."""
-        return self._work.most_records
-
-    @property
     def size(self) -> int:
         """Bytes of the file."""
         return self._size
-
-    @property
-    def unpacked(self) -> int:
-        """Bytes that all chunks unpack to."""
-        return self._work.unpacked
 
     def schema_name(self, channel: Channel) -> str:
         """Return the name of a channel's message type, "" when it has none."""
@@ -155,7 +146,7 @@ class McapLog:
         if self.message_counts is None or self.loss is not None:
             return None
         number = self.message_counts.get(channel, 0)
-        if number > self._work.unpacked // MESSAGE_ROW:
+        if number > self.work.unpacked // MESSAGE_ROW:
             raise self._damage(f"its statistics claim {number} messages of one topic, more than it holds")
         return number
 
@@ -177,11 +168,11 @@ class McapLog:
         data = unpack(self._file, chunk, self._bytes_at(chunk.begin, chunk.compressed_size))
         run = regular_run(self._file, chunk, data)
         if run is not None:
-            self._work.records_of(chunk.begin, len(run.time))
+            self.work.records_of(chunk.begin, len(run.time))
             self._known(run.channel)
             yield run
             return
-        for run in mixed_runs(self._file, chunk, data, self._define, self._work):
+        for run in mixed_runs(self._file, chunk, data, self._define, self.work):
             self._known(run.channel)
             yield run
 
@@ -259,7 +250,7 @@ class McapLog:
     def _data_record(self, op: int, content: bytes, at: int, crc: int) -> None:
         """Take a record of the data section that begins at `at`; `crc` is that of everything before it."""
         cursor, begin = Cursor(self._file, f"the record at byte {at}", content), at + RECORD_HEAD
-        self._work.record()
+        self.work.record()
         if at == len(MAGIC) and op != Op.HEADER:
             raise self._damage("its first record is not a header")
         if op == Op.HEADER:
@@ -269,7 +260,7 @@ class McapLog:
             self._define(op, content)
         elif op == Op.CHUNK:
             chunk = read_chunk(cursor, begin)
-            self._work.unpack(min(chunk.uncompressed_size, MAX_CHUNK))  # a larger one is refused by itself
+            self.work.unpack(min(chunk.uncompressed_size, MAX_CHUNK))  # a larger one is refused by itself
             if self._salvage:
                 deque(self.runs(chunk), maxlen=0)
             self.chunks.append(chunk)
@@ -284,7 +275,7 @@ class McapLog:
             )
             self.attachments.append(attachment)
         elif op == Op.METADATA:
-            self._work.define(len(content), 0)
+            self.work.define(len(content), 0)
             name, values = cursor.text(), cursor.mapping()
             if name == PREAMBLE:
                 self.preamble_holds = values.get("crc32") == str(crc)
@@ -299,7 +290,7 @@ class McapLog:
 
     def _loose_message(self, begin: int, size: int) -> None:
         """Take messages outside chunks as an unpacked chunk without a checksum of its own."""
-        self._work.unpacked += size
+        self.work.unpacked += size
         last = self.chunks[-1] if self.chunks else None
         if last is not None and last.follows_on(begin) and last.compressed_size + size <= MAX_CHUNK:
             self.chunks.pop()
@@ -312,13 +303,13 @@ class McapLog:
             raise LimitError(self._file, f"has a summary of {size} bytes; at most {limits.SUMMARY} are read")
         if size < 0 or self._bytes_at(self._size - len(MAGIC), len(MAGIC)) != MAGIC:
             raise self._damage("its end is missing or is not that of an MCAP file")
-        self.message_counts = read_summary(self._file, self._bytes_at(start, size), start, self._define, self._work)
+        self.message_counts = read_summary(self._file, self._bytes_at(start, size), start, self._define, self.work)
 
     def _define(self, op: int, content: bytes) -> None:
         if content in self._defined:
             return
         self._defined.add(content)
-        self._work.define(len(content), max(len(self.schemas), len(self.channels)))
+        self.work.define(len(content), max(len(self.schemas), len(self.channels)))
         cursor = Cursor(self._file, "a schema or channel", content)
         if op == Op.SCHEMA:
             number, schema = read_schema(cursor)

@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from replay.errors import RecordingError
+from replay import limits
+from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import MAGIC, Channel, Schema
 
 _ROS1 = b"#ROSBAG V"
 _SQLITE = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
-_LARGEST = 1 << 30  # bytes that a packed file or message of a bag is unpacked to
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,21 @@ def open_bag_folder(name: str, read: Callable[[str], bytes]) -> tuple[MessageLog
     from ruamel.yaml.error import YAMLError
 
     files = {"metadata.yaml": read("metadata.yaml")}
+    if len(files["metadata.yaml"]) > limits.BAG_YAML:
+        raise LimitError(name, f"has a metadata.yaml of more than {limits.BAG_YAML} bytes")
     try:
         listed = YAML(typ="safe", pure=True).load(files["metadata.yaml"].decode())["rosbag2_bagfile_information"]
-        paths = [str(path).replace("\\", "/").rpartition("/")[2] for path in listed["relative_file_paths"]]
-        packed = str(listed.get("compression_mode") or "").lower() == "message"
+        written, mode = listed["relative_file_paths"], listed.get("compression_mode") or ""
+        if not isinstance(mode, str) or not isinstance(written, list) or not all(isinstance(p, str) for p in written):
+            raise TypeError
+        paths = [path.replace("\\", "/").rpartition("/")[2] for path in written]
+        packed = mode.lower() == "message"
     except (YAMLError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RecordingError(name, "has a metadata.yaml that is not that of a ROS 2 bag") from None
+    if len(paths) > limits.BAG_FILES:
+        raise LimitError(
+            name, f"has a metadata.yaml that lists {len(paths)} files; at most {limits.BAG_FILES} are read"
+        )
     if not paths:
         raise RecordingError(name, "has a metadata.yaml that lists no files")
     files |= {path: read(path) for path in paths}
@@ -138,6 +147,7 @@ def _mcap(name: str, data: bytes) -> MessageLog:
         for chunk in log.chunks_with(wanted) if wanted else ():
             for run in log.runs(chunk):
                 if run.channel in wanted:
+                    log.work.decode(len(run.time))
                     for time, message in zip(run.time.tolist(), run.messages(), strict=True):
                         yield Message(run.channel, time, message)
 
@@ -149,9 +159,9 @@ def _unpacked(name: str, data: bytes) -> bytes:
 
     try:
         with zstandard.ZstdDecompressor().stream_reader(data) as stream:
-            result: bytes = stream.read(_LARGEST + 1)
+            result: bytes = stream.read(limits.UNPACKED_FILE + 1)
     except zstandard.ZstdError as error:
         raise RecordingError(name, f"damaged: cannot be unpacked ({error})") from None
-    if len(result) > _LARGEST:
-        raise RecordingError(name, f"unpacks to more than the {_LARGEST} bytes that are read")
+    if len(result) > limits.UNPACKED_FILE:
+        raise LimitError(name, f"unpacks to more than the {limits.UNPACKED_FILE} bytes that are read")
     return result

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from replay import limits
-from replay.errors import RecordingError
+from replay.errors import LimitError, RecordingError
 from replay.logs.joint_messages import TRANSFORMS, Decoder, decoder, kind_of
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import Channel
@@ -71,6 +71,7 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
             if run.channel not in decoders:
                 continue
             topic = log.channels[run.channel].topic
+            log.work.decode(len(run.time))
             try:
                 for message in run.messages():
                     for sample in decoders[run.channel](message):
@@ -78,6 +79,8 @@ def overview(log: McapLog, *, joints: bool = True) -> Overview:
                             ranges.setdefault((topic, joint), _Range()).add(position)
                     if len(ranges) > limits.JOINTS:
                         raise RecordingError(topic, "names more joints than a machine has")
+            except LimitError:
+                raise
             except RecordingError:  # JSON of another kind, say
                 del decoders[run.channel]
                 ranges = {key: found for key, found in ranges.items() if key[0] != topic}

@@ -11,6 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from replay import limits
+
+_NESTED = re.compile(r"(?:<[^<>;]*){5}")
+"""Types within types, which take the parser twice the time with each level; ROS has one level."""
 _IDL_SEPARATOR = "=" * 80 + "\n"
 
 
@@ -47,6 +51,24 @@ def long_name(name: str) -> str:
     return f"{package}/{rest if '/' in rest else f'msg/{rest}'}"
 
 
+class _Counted(str):
+    """A text that is not looked at without end."""
+
+    __slots__ = ("_looks",)
+    _looks: int
+
+    def __new__(cls, text: str) -> _Counted:
+        made = super().__new__(cls, text)
+        made._looks = 0
+        return made
+
+    def startswith(self, *arguments: Any) -> bool:
+        self._looks += 1
+        if self._looks > limits.DEFINITION_STEPS:
+            raise ValueError("its types are nested too deeply")
+        return super().startswith(*arguments)
+
+
 @functools.lru_cache(maxsize=64)
 def types_of(name: str, text: str, *, ros1: bool = False) -> Types:
     """Return the types that a definition of message `name` describes; some logs call `.msg` text IDL, and are read.
@@ -64,13 +86,18 @@ def types_of(name: str, text: str, *, ros1: bool = False) -> Types:
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
     own = long_name(name)
+    if _NESTED.search(text):
+        raise ValueError(f"its definition of {name} cannot be read: its types are nested too deeply")
+    text = "".join(
+        line for line in text.splitlines(keepends=True) if line.strip() and not line.lstrip().startswith("#")
+    )
     try:
         if re.search(r"^[ \t]*module\s+\w+", text, re.MULTILINE):
             parts = text.split(_IDL_SEPARATOR)
             bodies = [
                 re.sub(r"\A\s*IDL: .*\n|^[ \t]*#.*$", "", part, flags=re.MULTILINE) for part in parts if part.strip()
             ]
-            found = {key: value for body in bodies for key, value in get_types_from_idl(body).items()}
+            found = {key: value for body in bodies for key, value in get_types_from_idl(_Counted(body)).items()}
         else:
             found = get_types_from_msg(text, own)
     except (TypesysError, ValueError, KeyError, IndexError, AssertionError, RecursionError) as error:

@@ -39,6 +39,7 @@ def topic_table(log: McapLog, topic: str) -> tuple[dict[str, NDArray[Any]], str]
         RecordingError: damage.
     """
     found = sorted(_messages(log, topic), key=lambda entry: entry[0])
+    log.work.decode(len(found))
     reason = ""
     try:
         decoders = {

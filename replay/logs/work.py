@@ -19,15 +19,19 @@ class Work:
         self.unpacked = 0
         self._file = file
         self._most_bytes = limits.unpacked(size)
+        self._most_loose = limits.loose_records(size)
+        self._loose = 0
         self._records = 0
+        self._decoded, self._most_decoded = 0, limits.decoded(size)
         self._in_chunks: dict[int, int] = {}
         self._definitions = 0
 
     def record(self) -> None:
         """Count a record outside chunks; LimitError when there are too many."""
-        self._records += 1
-        if self._records > self.most_records:
-            self._too_many()
+        self._loose += 1
+        if self._loose > self._most_loose:
+            rule = f"holds more than {self._most_loose} records outside chunks"
+            raise LimitError(self._file, f"{rule}, the most that are read of a file of its size")
 
     def records_of(self, chunk: int, number: int) -> None:
         """Count the records in the chunk that begins at a byte, once however often it is read."""
@@ -42,6 +46,13 @@ class Work:
         if self.unpacked > self._most_bytes:
             rule = f"{self._most_bytes} bytes, the most that is read of a file of its size"
             raise LimitError(self._file, f"unpacks to more than {rule}")
+
+    def decode(self, messages: int) -> None:
+        """Count messages that are taken apart one by one; LimitError when they are too many."""
+        self._decoded += messages
+        if self._decoded > self._most_decoded:
+            rule = f"holds more than {self._most_decoded} messages to be taken apart"
+            raise LimitError(self._file, f"{rule}, the most of a file of its size")
 
     def define(self, size: int, channels: int) -> None:
         """Count a schema, a channel or metadata that was not there before."""

@@ -102,8 +102,8 @@ def export(
         if not fnmatch.filter(sources, pattern):
             raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
     chosen = [topic for topic in sorted(sources) if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)]
-    if isinstance(recording, McapLog) and len(chosen) * recording.unpacked > limits.passes(recording.size):
-        rule = f"has {len(chosen)} topics to be looked for in {recording.unpacked} bytes; choose some with --topic"
+    if isinstance(recording, McapLog) and len(chosen) * recording.work.unpacked > limits.passes(recording.size):
+        rule = f"has {len(chosen)} topics to be looked for in {recording.work.unpacked} bytes; choose some with --topic"
         raise LimitError(str(recording.path), rule)
     directory = Path(directory)
     stem = recording.path.name.removesuffix(".part").removesuffix(".mcap")

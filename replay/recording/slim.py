@@ -137,7 +137,7 @@ def _copy(log: McapLog, chunk: Chunk, writer: McapFileWriter, channels: Mapping[
     data = unpack(str(log.path), chunk, packed)
     found: dict[int, list[tuple[int, int, int, int]]] = {}
     only_messages = True
-    for op, begin, end in records(str(log.path), data, log.most_records):
+    for op, begin, end in records(str(log.path), data, log.work.most_records):
         if op == Op.MESSAGE and end - begin >= MESSAGE_HEAD:
             channel, sequence, time = struct.unpack_from("<HIQ", data, begin)
             found.setdefault(channel, []).append((begin, end, sequence, time))
