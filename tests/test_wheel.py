@@ -1,11 +1,16 @@
 """The wheel, installed outside the checkout, is all that its user needs besides what it depends on."""
 
+import ast
+import importlib.metadata
+import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -78,6 +83,20 @@ def test_the_wheel_holds_what_people_and_editors_need(wheel):
         assert any(name.endswith(f"/{file.relative_to(ROOT)}") or name == str(file.relative_to(ROOT)) for name in names)
     assert "replay/py.typed" in names
     assert not any("__pycache__" in name or name.startswith("tests/") for name in names)
+
+
+def test_what_is_imported_is_declared():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    known = [*declared["dependencies"], *itertools.chain(*declared["optional-dependencies"].values())]
+    known = {re.split(r"[\s<>=~!\[;]", requirement)[0].lower().replace("_", "-") for requirement in known}
+    owners = importlib.metadata.packages_distributions()
+    for path in (ROOT / "replay").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+            for module in {name.partition(".")[0] for name in names} - sys.stdlib_module_names - {"replay"}:
+                found = {name.lower().replace("_", "-") for name in owners.get(module, [])}
+                assert not found or found & known, f"{path}: {module} of {', '.join(found)} is not in pyproject.toml"
 
 
 def test_metadata_say_what_it_is(wheel):
