@@ -1,10 +1,10 @@
-"""All that reaches into numba: kernels are lowered one by one, and optimised once, in those that Python calls.
+"""All that reaches into numba: kernels are lowered one by one, and optimised in those alone that Python calls.
 
 numba makes of every function that it compiles a module that is optimised, turned into machine code, given two wrappers
 for callers outside, and kept in a file; then it takes the module into each caller and does all of it again. Of these
 kernels few are ever called from outside. Here a function that a kernel calls ends as LLVM code (`KernelLibrary`). When
 Python calls a kernel, the code of all that it reaches is linked into one module, which gets the one wrapper it needs,
-is optimised once, and is kept under the kernel's key (`reach`, `store`). The arithmetic is the same: with this
+is optimised as a whole, and is kept under the kernel's key (`reach`, `store`). The arithmetic is the same: with this
 package's policy LLVM reorders and contracts nothing.
 
 Besides, while kernels are compiled: Python's garbage collection rests (what it looks through is all in use); constants
