@@ -75,12 +75,11 @@ def test_the_readme_states_the_bounds_as_they_are() -> None:
 
 def refused(path: Path) -> str:
     """Read a log to its end; return why it is refused, and that no part of it is salvaged."""
-    begin = time.monotonic()
     for salvage in (False, True):
         with pytest.raises(LimitError) as caught, McapLog(path, salvage=salvage) as log:
             for part in log.chunks:
                 list(log.runs(part))
-    assert time.monotonic() - begin < 60.0 and "\n" not in str(caught.value)
+    assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
@@ -305,10 +304,8 @@ PLY = (
     ],
 )
 def test_meshes_are_bounded(name, data, words) -> None:
-    begin = time.monotonic()
     with pytest.raises(MeshError, match=words):
         read_faces(name, data())
-    assert time.monotonic() - begin < 30.0
 
 
 @pytest.mark.parametrize(

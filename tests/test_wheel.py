@@ -110,26 +110,25 @@ def test_metadata_say_what_it_is(wheel):
         assert any(line.startswith(begin) for line in lines), begin
 
 
-def test_it_runs_compares_and_shows_outside_the_checkout(installed, tmp_path):
+@pytest.fixture(scope="module")
+def recorded(installed, tmp_path_factory):
+    """Return a folder in which the environment has run a scenario that comes with it, twice."""
+    folder = tmp_path_factory.mktemp("recorded")
+    for name in ("one", "two"):
+        use(installed, folder, "replay", "run", installed / "share/replay/scenarios/carm_clear.yaml", "-o", name)
+    return folder
+
+
+def test_it_runs_and_compares_outside_the_checkout(installed, recorded, tmp_path):
     where = use(installed, tmp_path, "python", "-c", "import replay; print(replay.__file__)")
     assert Path(where.strip()).is_relative_to(installed)
     assert use(installed, tmp_path, "replay", "--version").split()[-1] == replay.__version__
     assert json.loads(use(installed, tmp_path, "replay", "schema"))["$schema"].startswith("https://json-schema.org/")
-    scenario = installed / "share" / "replay" / "scenarios" / "carm_clear.yaml"
-    for folder in ("one", "two"):
-        use(installed, tmp_path, "replay", "run", scenario, "-o", folder)
-    assert "same" in use(installed, tmp_path, "replay", "diff", "one", "two")
-    if not list(Path("/usr/share/vulkan/icd.d").glob("*.json")):
-        pytest.skip("needs a Vulkan driver for a picture; the rest was seen")
-    use(
-        installed,
-        tmp_path,
-        "replay",
-        "view",
-        "one/carm_clear/carm_clear.rrd",
-        "--screenshot",
-        "picture.png",
-        "--at",
-        "1",
-    )
-    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    assert "same" in use(installed, recorded, "replay", "diff", "one", "two")
+
+
+@pytest.mark.skipif(not list(Path("/usr/share/vulkan/icd.d").glob("*.json")), reason="needs a Vulkan driver")
+def test_it_shows_outside_the_checkout(installed, recorded, tmp_path):
+    file, picture = recorded / "one" / "carm_clear" / "carm_clear.rrd", tmp_path / "picture.png"
+    use(installed, tmp_path, "replay", "view", file, "--screenshot", picture, "--at", "1")
+    assert picture.read_bytes().startswith(b"\x89PNG")

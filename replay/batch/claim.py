@@ -107,6 +107,7 @@ def _acquire(directory: Path, shared: bool) -> int:
     path = directory / LOCK
     until = time.monotonic() + _SECONDS_OF_DYING
     while True:
+        late = time.monotonic() > until
         refuse_link(path)
         handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
@@ -119,8 +120,10 @@ def _acquire(directory: Path, shared: bool) -> int:
                 return signed
             if not ours:
                 user, alive = _user(handle)
-                if alive or time.monotonic() > until:
+                if alive or late:
                     raise BusyError(str(directory), user)
+            elif late:
+                raise BusyError(str(directory), "others, which remove its lock all the time")
         finally:
             if handle >= 0:
                 os.close(handle)

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from replay.batch.case import CaseOrder, CaseResult
-from replay.batch.pool import Ended, Ending, Pool, Task
+from replay.batch.pool import Pool
+from replay.batch.task import Ended, Ending, Task
 from replay.batch.tls import Certificates, security_for
 from replay.batch.worker import Prepare, Work
 from replay.errors import InvalidValue, MissingPackageError, NoSpaceError, WorkerError, WriteError

@@ -41,8 +41,6 @@ from replay.batch.worker import (
 )
 from replay.errors import InvalidValue, WorkerError
 
-__all__ = ["Ended", "Ending", "Pool", "Task"]
-
 T = TypeVar("T")
 
 _SECONDS_BETWEEN_CHECKS = 0.1

@@ -18,10 +18,11 @@ from replay.batch.case import CaseOrder, CaseResult, Status, run_case
 from replay.batch.case_folder import KINDS, LOG, begin, finish, remove_unfinished, unwritable
 from replay.batch.claim import Claim, claim
 from replay.batch.cost import expected_cost
-from replay.batch.pool import Ended, Ending, Pool, Task
+from replay.batch.pool import Pool
 from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import earlier_result
 from replay.batch.run_file import Run, RunFile
+from replay.batch.task import Ended, Ending, Task
 from replay.batch.tls import Certificates
 from replay.batch.watch import Unwatched, Watch
 from replay.errors import NoSpaceError, RecordingExistsError, WriteError

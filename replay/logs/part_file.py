@@ -19,6 +19,7 @@ _NO_SPACE = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT") if hasattr(er
 UNFINISHED = ".part"
 """What the name of a file ends in while it is written."""
 _numbers = itertools.count(1)
+_TRIES = 100
 
 
 class PartFile:
@@ -119,7 +120,7 @@ def _open_part(path: Path) -> tuple[Path, BinaryIO, bool]:
     part = path.with_name(path.name + UNFINISHED)
     if part.is_char_device():
         return part, part.open("wb"), False
-    while True:
+    for _ in range(_TRIES):
         try:
             stream = part.open("xb")
         except FileExistsError:
@@ -129,6 +130,7 @@ def _open_part(path: Path) -> tuple[Path, BinaryIO, bool]:
         if lock(stream.fileno()) and is_at(stream.fileno(), part):
             return part, stream, True
         stream.close()  # another process took it for left over before it was locked
+    raise OSError(errno.EBUSY, f"others write and remove {part.name} all the time")
 
 
 def _remove_left_over(part: Path) -> bool:

@@ -55,7 +55,7 @@ class Field:
         chart: title of the chart that shows it over time; "" for none.
         beam: it is a point in world coordinates, drawn at the end of a line from its sensor.
         type: of the values.
-        most: largest value of one that counts or is a state; of `states` it follows.
+        most: largest value of one that counts or is a state; what its type or `states` allow when left out.
         nothing: the value when there is nothing to tell.
     """
 
@@ -74,7 +74,7 @@ class Field:
     chart: str = ""
     beam: bool = False
     type: np.dtype[Any] = dataclasses.field(default_factory=lambda: np.dtype(np.float64))
-    most: int = 1
+    most: int = 0
     nothing: float = np.nan
 
 
@@ -102,6 +102,9 @@ def _described(name: str, array: Any, field: Field) -> Field:
     """Return the description of a column, with what follows from its name and type."""
     dtype = np.dtype(get_args(get_args(array)[1])[0])
     kinds = {"f": Kind.NUMBER, "b": Kind.FLAG}
+    most = max(field.states) if field.states else field.most
+    if not most and dtype.kind != "f":
+        most = 1 if dtype.kind == "b" else int(np.iinfo(dtype).max)
     nothing = {"f": np.nan, "i": -1}
     return dataclasses.replace(
         field,
@@ -109,7 +112,7 @@ def _described(name: str, array: Any, field: Field) -> Field:
         kind=Kind.LEVEL if field.states else kinds.get(dtype.kind, Kind.CATEGORY),
         label=field.label or name.replace("_", " "),
         begins=field.begins or tuple(field.events),
-        most=max(field.states) if field.states else field.most,
+        most=most,
         type=dtype,
         nothing=nothing.get(dtype.kind, 0),
     )

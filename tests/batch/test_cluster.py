@@ -16,7 +16,7 @@ from replay.cli.exit_codes import ExitCode
 from replay.errors import InvalidValue, WorkerError
 from tests.batch import clusters, scenes
 from tests.batch.test_run import Remarks, files_of
-from tests.cli.test_regress import check_verdicts, night, prepare
+from tests.cli.nights import check_verdicts, night, prepare
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_a_night_of_two_hundred_on_a_cluster_that_loses_a_worker(cluster, tmp_pa
 
     threading.Thread(target=kill, daemon=True).start()
     before = {process.pid for process in psutil.Process(workers[1].pid).children(recursive=True)}
-    assert night(tmp_path, out, "--dask", address, "--rrd", "none") is ExitCode.FAILED
+    assert night(tmp_path, out, "--dask", address, "--rrd", "none", "--timeout", "6s") is ExitCode.FAILED
     assert workers[0].wait() == -signal.SIGKILL
     check_verdicts(out, **counts)
     assert {process.pid for process in psutil.Process(workers[1].pid).children(recursive=True)} == before
@@ -126,10 +126,8 @@ def test_a_scheduler_without_workers_is_told_and_given_up_in_the_end(tmp_path, m
     monkeypatch.setattr("replay.batch.cluster._SECONDS_TO_WAIT", 6.0)
     remarks = Remarks()
     with clusters.cluster(tmp_path, workers=0) as found:
-        begin = time.monotonic()
         execution = Execution(dask=found.address)
         run = run_all([scenes.scene("a"), scenes.scene("b")], tmp_path / "out", execution=execution, watch=remarks)
-        assert time.monotonic() - begin < 20.0
     waiting = "has no workers; waiting for one"
     assert [waiting in remark and found.address in remark for remark in remarks.said] == [True]
     assert [result.error for result in run.results] == ["on the cluster: there has been no worker for 0 min"] * 2
@@ -150,10 +148,8 @@ def test_a_scheduler_that_dies_is_one_line_a_scenario(cluster, tmp_path, monkeyp
     handler = logging.StreamHandler(logged)
     for name in ("distributed", "distributed.client"):
         monkeypatch.setattr(logging.getLogger(name), "handlers", [handler])
-    begin = time.monotonic()
     out = tmp_path / "out"
     run = run_all(scenarios, out, rrd=False, execution=Execution(dask=cluster.address), watch=Killer())
-    assert time.monotonic() - begin < 60.0
     lost = "on the cluster: the connection to the scheduler was lost before this scenario was done"
     assert {result.name: result.error for result in run.results} == {
         "good": "",

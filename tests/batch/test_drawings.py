@@ -4,7 +4,7 @@ import re
 
 from replay.batch import drawings
 from replay.cli.exit_codes import ExitCode
-from tests.cli.test_regress import night, prepare
+from tests.cli.nights import night, prepare
 
 
 def test_what_there_is_no_room_for_is_told(tmp_path, monkeypatch):

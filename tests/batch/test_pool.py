@@ -8,7 +8,8 @@ import time
 import psutil
 import pytest
 
-from replay.batch.pool import Ending, Pool, Task
+from replay.batch.pool import Pool
+from replay.batch.task import Ending, Task
 from replay.errors import InvalidValue
 from tests.batch.tasks import PrepareTogether, behave, eat_and_forget_nothing, slow_start
 
@@ -117,7 +118,7 @@ def test_closing_the_iterator_ends_every_process():
 
 def test_workers_do_not_outlive_a_pool_that_is_killed():
     code = (
-        "from replay.batch.pool import Pool, Task; from tests.batch.tasks import behave;"
+        "from replay.batch.pool import Pool; from replay.batch.task import Task; from tests.batch.tasks import behave;"
         "list(Pool(behave, workers=1, follow=lambda *_: print('on', flush=True)).run([Task('a', ('hang', None))]))"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:

@@ -45,5 +45,5 @@ class DistanceColumns(Columns):
     point_sensor: Annotated[Floats, Field(unit="m", gate="status", label="point in sensor", letters="xyz")]
     normal: Annotated[Floats, Field(gate="status", label="normal in world", letters="xyz")]
     shape: Annotated[Integers, Field(gate="status", names="shapes")]
-    triangle: Annotated[Integers, Field(gate="status", most=2**31 - 1)]
+    triangle: Annotated[Integers, Field(gate="status")]
     case: Annotated[Bytes, Field(gate="status", most=5)]
