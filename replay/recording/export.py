@@ -25,7 +25,7 @@ from replay.logs.tables import topic_table
 from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
-from replay.recording.topics import WORLD
+from replay.recording.topics import world_frame
 from replay.sensing.kinds import KINDS
 from replay.simulation import Layout
 
@@ -44,8 +44,9 @@ def tables(recording: Recording) -> dict[str, Table]:
     for joint, (name, unit) in enumerate(zip(layout.joints, layout.joint_units, strict=True)):
         result["/joint_states"][f"{name} position [{unit}]"] = recording.joint_positions[:, joint]
         result["/joint_states"][f"{name} velocity [{unit}/s]"] = recording.joint_velocities[:, joint]
+    world = world_frame(layout)
     for link, name in enumerate(layout.links):
-        place = f"{name} in {WORLD}"
+        place = f"{name} in {world}"
         _vector(result["/tf"], place, " [m]", recording.link_poses[:, link, :3, 3], "xyz")
         _vector(result["/tf"], f"{place} quat", "", recording.link_quaternions[:, link], "xyzw")
     if recording.collision is not None:

@@ -16,7 +16,7 @@ from replay.recording.events import EventFinder
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.scene_update import scene_message
 from replay.recording.scene_view import SceneView
-from replay.recording.topics import WORLD, FrameTopic, frame_topics
+from replay.recording.topics import FrameTopic, frame_topics
 from replay.simulation import FrameBlock
 
 _MEDIA_TYPES = {
@@ -58,8 +58,6 @@ class McapWriter:
             RecordingExistsError: it exists and may not be overwritten.
             WriteError: the file cannot be written.
         """
-        if WORLD in provenance.layout.links:
-            raise InvalidValue("links", WORLD, "no link may have the name of the frame that all links are placed in")
         self._provenance = provenance
         self._scene = scene
         self._files = files

@@ -228,7 +228,10 @@ def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> l
         name = resolve_name(str(node.value), text.names[node.place.file])
     except SourceRule as error:
         return [problem_at(root, (*PATH, "file"), str(error))]
-    found = read(scenario, library, name)
+    try:
+        found = read(scenario, library, name)
+    except InvalidValue:
+        return []  # links or joints that are their own ancestors, which is told already
     provenance.tracks.update(found.tracks)
     provenance.free_tracks.update(found.free)
     provenance.log_notes.extend(found.notes)

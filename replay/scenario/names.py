@@ -14,13 +14,13 @@ from pydantic import TypeAdapter, ValidationError
 from replay.collision.globs import Globs
 from replay.language.fields import Part
 from replay.language.node import Node
-from replay.language.units import Distance
+from replay.language.units import Dimensioned, Distance
 from replay.scenario.collision import Disable
 from replay.scenario.expectations import Expectation
 from replay.scenario.links import Continuous, Joint, Prismatic, Revolute
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.model import Scenario
-from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoints
+from replay.scenario.motion import Keyframe, Keyframes, Move, Positions, Waypoint, Waypoints
 from replay.scenario.source import find
 from replay.sensing.kinds import KINDS
 
@@ -118,6 +118,17 @@ class Names:
     @cached_property
     def _shape_globs(self) -> tuple[Globs, Globs]:
         return Globs([shape.link for shape in self.shapes]), Globs([shape.full for shape in self.shapes])
+
+    @cached_property
+    def poses(self) -> dict[str, dict[str, Dimensioned] | None]:
+        """Joint positions by pose."""
+        return {name: self._entry(Positions, "poses", name) for name in self._map("poses")}
+
+    @property
+    def initial(self) -> str | None:
+        """The pose that the motion begins in."""
+        node = find(self.root, ("motion", "initial"))
+        return None if node is None else _text(node)
 
     @cached_property
     def points(self) -> dict[str, tuple[Waypoint, ...] | None]:

@@ -67,10 +67,11 @@ def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     moves = scenario.motion.moves
     profiles = joint_profiles(linkage(scenario), script(scenario)) if moves else {}
     late: dict[int, float] = {}
-    for joint in {name for move in moves for name in move.to}:
+    targets = [scenario.target(move) for move in moves]
+    for joint in {name for target in targets for name in target}:
         seconds = max(profiles[joint].end, default=0.0)
         if seconds > end + 1e-9:
-            index = max(index for index, move in enumerate(moves) if joint in move.to)
+            index = max(index for index, target in enumerate(targets) if joint in target)
             late[index] = max(seconds, late.get(index, 0.0))
     yield from sorted(late.items())
 
