@@ -80,6 +80,11 @@ def load_sources(main: str, sources: Mapping[str, bytes], *, case: str | None = 
     return file.scenario() if case is None else file.case(case)
 
 
+def load_from(library: Library) -> Scenario:
+    """Read a scenario from wherever its files are; ScenarioError as `load`."""
+    return _File(library).scenario()
+
+
 def load_model(file_or_name: str | Path) -> Model:
     """Return a built-in model by its name, or the model that a YAML file holds.
 
