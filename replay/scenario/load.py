@@ -32,7 +32,7 @@ from replay.scenario.source import (
     problem_at,
     resolve_name,
 )
-from replay.scenario.sweep import Sweep, SweepCase, cases, replaced
+from replay.scenario.sweep import SweepCase, SweepPart, cases, replaced
 from replay.scenario.yaml_text import parse
 
 VERSION = 1
@@ -157,7 +157,7 @@ class _File:
         if title is None or not isinstance(title.value, str) or title.value == name or sweep is None:
             return self.scenario()
         try:
-            Sweep.model_validate(sweep.data())
+            SweepPart.model_validate(sweep.data())
         except ValidationError:
             return self.scenario()  # which says what is wrong
         for case in cases(self._root, title.value):

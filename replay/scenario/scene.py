@@ -187,7 +187,7 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     problems: list[Problem] = []
     found = []
 
-    def mesh(link: str, name: str, shape: shapes.Mesh) -> Solid:
+    def mesh(link: str, name: str, shape: shapes.MeshPart) -> Solid:
         file = scenario.provenance.meshes.get((link, name))
         if file is None:
             raise MeshError(shape.file, "is not at hand: scenarios with meshes come from `load` or `load_sources`")
@@ -200,7 +200,7 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     for link, entry in scenario.links.items():
         for name, shape in entry.shapes.items():
             try:
-                solid = mesh(link, name, shape) if isinstance(shape, shapes.Mesh) else _primitive(shape)
+                solid = mesh(link, name, shape) if isinstance(shape, shapes.MeshPart) else _primitive(shape)
             except MeshError as error:
                 path = ("links", link, "shapes", name, "file")
                 problems.append(scenario.provenance.problem(path, f"cannot be used: {error.reason}"))
@@ -217,19 +217,19 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
 def _primitive(shape: shapes.ShapePart) -> Solid:
     """Return a shape that is no mesh, in its own frame."""
     match shape:
-        case shapes.Cube():
+        case shapes.CubePart():
             return primitives.cube(shape.size)
-        case shapes.Cuboid():
+        case shapes.CuboidPart():
             return primitives.cuboid(shape.size)
-        case shapes.Plane():
+        case shapes.PlanePart():
             return primitives.plane(shape.size)
-        case shapes.Sphere():
+        case shapes.SpherePart():
             return primitives.sphere(shape.radius, shape.chord_error)
-        case shapes.Cylinder():
+        case shapes.CylinderPart():
             return primitives.cylinder(shape.radius, shape.height, shape.chord_error)
-        case shapes.Cone():
+        case shapes.ConePart():
             return primitives.cone(shape.radius, shape.height, shape.chord_error)
-        case shapes.Arc():
+        case shapes.ArcPart():
             return primitives.arc(shape.radius, shape.span, shape.width, shape.thickness, shape.chord_error)
         case _:
             raise AssertionError(f"{type(shape).__name__} is no primitive shape")
