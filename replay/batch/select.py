@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.folders import look_through
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
@@ -161,7 +161,7 @@ class Selection:
     @property
     def failed(self) -> list[CaseResult]:
         """The results of the files that are not valid, which cannot be run."""
-        return [CaseResult(n, Status.FAILED, error=str(error), invalid=True) for n, error in self.invalid.items()]
+        return [CaseResult(n, CaseStatus.FAILED, error=str(error), invalid=True) for n, error in self.invalid.items()]
 
     @staticmethod
     def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from replay.bench import carm
 from replay.bench.inputs import rotations
 from replay.bench.measure import Check, Contender, compete, exponent
-from replay.bench.report import Grid, Plot, Report
+from replay.bench.report import Grid, LogLogPlot, Report
 from replay.collision.bodies import Bounds, Volumes, collect, fit_volumes
 from replay.collision.broad import COUNTS, sieve
 from replay.collision.columns import Level
@@ -44,7 +44,7 @@ def growth(report: Report, *, most: int, rounds: int) -> None:
         for name in ("replay, obb", "replay, sphere")
     }
     named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}
-    report.plots.append(Plot("a frame against its bodies", "bodies", "s per frame", named, joined=True))
+    report.plots.append(LogLogPlot("a frame against its bodies", "bodies", "s per frame", named, joined=True))
     half = min(len(sizes) // 2, len(sizes) - 2)
     for name, points in lines.items():
         report.notes.append(

@@ -12,7 +12,7 @@ from replay.bench.goals import Goal, advantage
 from replay.bench.hard_sensing import hard_plates
 from replay.bench.inputs import around, box_surface, phantom, slivers
 from replay.bench.measure import Check, Contender, Row, absent, compete
-from replay.bench.report import Plot, Report, pareto_plot
+from replay.bench.report import LogLogPlot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
 from replay.geometry.tree import triangle_tree
@@ -173,6 +173,6 @@ def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
     return Check(float(error.max()), wrong, tolerance, float(error.mean()))
 
 
-def _plot(name: str, rows: Sequence[Row]) -> Plot:
+def _plot(name: str, rows: Sequence[Row]) -> LogLogPlot:
     groups = {row.method: row.method.split()[0] for row in rows}
     return pareto_plot(name, rows, "worst relative error", groups, headline=name == LARGE)

@@ -19,7 +19,7 @@ from replay.bench import broad_phase
 from replay.bench.inputs import around, torus
 from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
 from replay.bench.pipeline import FAST, MODELS, scenario
-from replay.bench.report import Grid, Plot, Report
+from replay.bench.report import Grid, LogLogPlot, Report
 from replay.errors import ScenarioError
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
 from replay.numerics import transforms
@@ -223,7 +223,7 @@ def _law(report: Report, title: str, x: str, y: str, lines: Points, rows: list[R
     """Add table, plot and the fitted exponent of each line, over all sizes and over the larger half."""
     report.tables[title] = rows
     named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}
-    report.plots.append(Plot(title, x, y, named, joined=True))
+    report.plots.append(LogLogPlot(title, x, y, named, joined=True))
     for name, points in lines.items():
         half = min(len(points) // 2, len(points) - 2)
         large = exponent(points[half:])

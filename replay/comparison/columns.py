@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.comparison import difference as result
-from replay.comparison.events import Matched, Track, match, tracks
+from replay.comparison.events import Matched, StateTrack, match, tracks
 from replay.comparison.numbers import Errors, Flags, compare_numbers, compare_rotations
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.signals import Column, Group, Signal, unify_categories
@@ -180,7 +180,7 @@ def _compare_states(
     kept = np.arange(len(x)) if echo is None else np.flatnonzero(~echo)
     echoes = 0 if echo is None else int((x[echo] != y[echo]).sum())
     x, y = x[kept], y[kept]
-    events: list[result.Event] = []
+    events: list[result.EventDifference] = []
     count = outside = lone = 0
     max_shift, max_frames = 0.0, 0
     for track in tracks(field, x, y, categories):
@@ -237,14 +237,14 @@ class _Shifts:
 
 
 def _listed(
-    track: Track, matched: Matched, shifts: _Shifts, frames: MatchedFrames, kept: Indices
-) -> Sequence[result.Event]:
+    track: StateTrack, matched: Matched, shifts: _Shifts, frames: MatchedFrames, kept: Indices
+) -> Sequence[result.EventDifference]:
     events = []
     for k in range(min(len(matched.state), result.LISTED_EVENTS)):
         in_a, in_b = int(matched.baseline[k]), int(matched.candidate[k])
         paired = bool(shifts.paired[k])
         events.append(
-            result.Event(
+            result.EventDifference(
                 what=track.label(int(matched.state[k])),
                 fate=result.Fate.SHIFTED if paired else result.Fate.VANISHED if in_a >= 0 else result.Fate.APPEARED,
                 baseline=None if in_a < 0 else frames.baseline_moment(int(kept[in_a])),

@@ -18,7 +18,7 @@ MAX_OPTIMAL = 2000
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class StateTrack:
     """One sequence of states whose changes are events.
 
     Attributes:
@@ -51,7 +51,7 @@ class Matched:
     candidate: Frames
 
 
-def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[str, ...]) -> Iterator[Track]:
+def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[str, ...]) -> Iterator[StateTrack]:
     """Yield the tracks of a pair of state columns.
 
     Ordered states give one track a threshold: a run that goes from clear to contact at once and one that touches the
@@ -63,16 +63,16 @@ def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[
     if field.kind is Kind.CATEGORY:
         rest = 0 if field.name == "case" else -1
         labels: dict[int | None, str] = {k - 1: f"{field.name} becomes {text}" for k, text in enumerate(categories)}
-        yield Track(baseline, candidate, rest, labels | {None: f"{field.name} becomes {{}}"})
+        yield StateTrack(baseline, candidate, rest, labels | {None: f"{field.name} becomes {{}}"})
         return
     highest = max(len(field.begins), int(baseline.max()), int(candidate.max()))
     for threshold in range(1, highest + 1):
         name = field.begins[threshold - 1] if threshold <= len(field.begins) else f"{field.name} {threshold}"
         above = (baseline >= threshold).astype(np.int64), (candidate >= threshold).astype(np.int64)
-        yield Track(*above, rest=0, labels={1: f"{name} begins", 0: f"{name} ends"})
+        yield StateTrack(*above, rest=0, labels={1: f"{name} begins", 0: f"{name} ends"})
 
 
-def match(track: Track) -> Matched:
+def match(track: StateTrack) -> Matched:
     """Return the events of a track that are not in the same frame in both runs, and which corresponds to which.
 
     Events that both runs have in the same frame are fixed. Between two of them, the events that lead to the same state

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay import limits
-from replay.geometry.ply_numbers import Binary, Columns, Element, Lists, Property, Text, columns_of
+from replay.geometry.ply_numbers import BinaryNumbers, Columns, Element, Lists, Property, TextNumbers, columns_of
 from replay.geometry.polygons import triangulate
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ def read(data: bytes) -> tuple[Floats, Indices]:
     announced = ", ".join(f"{element.name} {element.count}" for element in elements)
     old_mac = body.startswith(b"\r") and not body.startswith(b"\r\n")  # whose lines end so
     body = body[1:] if old_mac else body.partition(b"\n")[2]
-    source: Text | Binary = Binary(body, announced)
+    source: TextNumbers | BinaryNumbers = BinaryNumbers(body, announced)
     if order:
         least = sum(element.count * element.least for element in elements)
         if len(body) < least:
@@ -61,7 +61,7 @@ def read(data: bytes) -> tuple[Floats, Indices]:
             rule = f"its header announces {element.name[:60]} {element.count}"
             raise ValueError(f"{rule}; at most {limits.TRIANGLES} of an element are read")
     if not order:
-        source = Text(body, announced)
+        source = TextNumbers(body, announced)
     columns = [(element, columns_of(element, source)) for element in elements]
     points, triangles = np.zeros((0, 3)), [np.zeros((0, 3), np.int64)]
     for element, found in columns:

@@ -68,7 +68,7 @@ class Source(Protocol):
         """Return the next numbers, (count,), all of one kind; ValueError when there are fewer."""
 
 
-class Text:
+class TextNumbers:
     """Numbers written as words."""
 
     def __init__(self, body: bytes, announced: str) -> None:
@@ -107,7 +107,7 @@ def _parts(text: bytes) -> Iterator[bytes]:
         begin = end.start() + 1 if end else len(text) + 1
 
 
-class Binary:
+class BinaryNumbers:
     """Numbers as bytes."""
 
     def __init__(self, body: bytes, announced: str) -> None:

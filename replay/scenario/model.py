@@ -16,7 +16,7 @@ from replay.scenario.links import LinkPart
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.motion import MotionPart
 from replay.scenario.sensors import Sensors
-from replay.scenario.source import Provenance
+from replay.scenario.source import ScenarioProvenance
 from replay.scenario.sweep import SweepPart
 
 MAX_FRAMES: Final = 100_000_000
@@ -60,7 +60,7 @@ class Scenario(Fragment):
     """Length [s]; frames are at k/rate for k = 0..floor(duration*rate)."""
     sweep: SweepPart | None = None
     """Cases that replace some values of this scenario."""
-    _provenance: Provenance = PrivateAttr(default_factory=Provenance)
+    _provenance: ScenarioProvenance = PrivateAttr(default_factory=ScenarioProvenance)
 
     @model_validator(mode="after")
     def _few_enough_frames(self) -> Self:
@@ -98,6 +98,6 @@ class Scenario(Fragment):
         return self._provenance.main
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> ScenarioProvenance:
         """Where everything was read."""
         return self._provenance

@@ -36,7 +36,7 @@ _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
 
 
 @dataclass
-class Found:
+class RecordedMotion:
     """What a log says of a scenario's motion.
 
     Attributes:
@@ -56,7 +56,7 @@ class Found:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def read(scenario: Scenario, library: Library, name: str) -> Found:
+def read(scenario: Scenario, library: Library, name: str) -> RecordedMotion:
     """Return what the log of a scenario says.
 
     Args:
@@ -64,10 +64,10 @@ def read(scenario: Scenario, library: Library, name: str) -> Found:
         library: where its files are.
         name: of the log in the library: a file, or a ROS 2 bag's folder.
     """
-    return _Reader(scenario, library, name).found()
+    return _MotionReader(scenario, library, name).found()
 
 
-class _Reader:
+class _MotionReader:
     """Reads one scenario's log."""
 
     def __init__(self, scenario: Scenario, library: Library, name: str) -> None:
@@ -76,10 +76,10 @@ class _Reader:
         self._written: RecordedPart = scenario.motion.recorded
         self._library = library
         self._name = name
-        self._found = Found()
+        self._found = RecordedMotion()
         self._rows: set[int] = set()
 
-    def found(self) -> Found:
+    def found(self) -> RecordedMotion:
         """Return what it says."""
         found = self._found
         try:

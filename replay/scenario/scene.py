@@ -19,6 +19,7 @@ from replay.geometry.solid import Solid
 from replay.kinematics.linkage import Linkage
 from replay.kinematics.motion import Script
 from replay.scenario import frames, shapes
+from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.expectations import PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_model
@@ -27,7 +28,6 @@ from replay.scenario.model import Scenario
 from replay.scenario.names import matches
 from replay.scenario.notes import notes, piece_notes
 from replay.scenario.script import linkage, script
-from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.kinds import KINDS, of_kind
 from replay.sensing.target import Target, make_target
 

@@ -16,7 +16,7 @@ from replay.language.node import Place
 from replay.scenario.expectations import Between, PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.names import matches
-from replay.scenario.source import Provenance
+from replay.scenario.source import ScenarioProvenance
 from replay.scenario.tallies import Begin, Count, Extremes, Tally, Times, Values
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
@@ -74,12 +74,12 @@ class ExpectationCheck:
         *,
         clearance: str = "near",
         margin: float = math.inf,
-        provenance: Provenance | None = None,
+        provenance: ScenarioProvenance | None = None,
     ) -> None:
         self._layout = layout
         self._clearance = clearance
         self._margin = margin
-        self._provenance = provenance or Provenance()
+        self._provenance = provenance or ScenarioProvenance()
         self._checks: list[_Check] = []
         for index, expectation in enumerate(expectations):
             if isinstance(expectation, PairExpectation):
