@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench import carm
 from replay.bench.inputs import rotations
@@ -21,8 +20,7 @@ from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.primitives import cuboid
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Flags
 
 VOLUMES: tuple[Literal["obb", "obb_vertices", "aabb", "sphere"], ...] = get_args(Bounds)
 FRAMES = 64
@@ -62,7 +60,7 @@ def tightness(frames: int, rounds: int) -> Grid:
     turns = np.ascontiguousarray(np.moveaxis(poses.world[:, :, :3, :3], 1, 0))
     asked = unanswered(rows, relative, turns)
     contenders: list[Contender] = []
-    passed: dict[str, NDArray[np.bool_]] = {}
+    passed: dict[str, Flags] = {}
     for bounds in VOLUMES:
         volumes = fit_volumes(bodies, arrays, bounds=bounds, pieces="exact")
         run = _sieve(volumes, asked)

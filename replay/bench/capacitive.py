@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.goals import Goal, advantage
 from replay.bench.hard_sensing import hard_plates
@@ -17,12 +16,12 @@ from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.clusters import make_clusters
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
-Floats = NDArray[np.float64]
 Answer = Callable[[], Floats]
 
 PLATE = np.array([[0.025, 0.1]])

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.batch.run import Execution, run_all
 from replay.bench import broad_phase
@@ -23,6 +22,7 @@ from replay.bench.report import Grid, LogLogPlot, Report
 from replay.errors import ScenarioError
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.scenario.load import load_sources
 from replay.scenario.model import Scenario
 from replay.scenario.scene import build
@@ -32,7 +32,6 @@ from replay.sensing.distance import DistanceSensor, DistanceSuite
 from replay.sensing.target import Target, make_target
 from replay.simulation import Simulation, simulate
 
-Floats = NDArray[np.float64]
 Points = dict[str, list[tuple[float, float]]]
 
 FRAMES = (64, 256, 1024, 4096)

@@ -26,7 +26,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import simplex as faces
 from replay.collision.exact_simplex import WITNESS
@@ -46,9 +45,8 @@ from replay.collision.gjk_exact import (
     write_witness,
 )
 from replay.collision.support import Sets, farthest
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import inlined_kernel
-
-Floats = NDArray[np.float64]
 
 ITERATIONS = 48
 """Cap of the loop in doubles; random pairs of 642-vertex hulls need at most about 20. Beyond it, double-doubles."""

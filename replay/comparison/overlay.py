@@ -21,6 +21,7 @@ from replay.comparison.log_changes import read_scene
 from replay.comparison.plots import ComparedCurve, Curves
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, RecordingPair, RunDifference
+from replay.numerics.arrays import Floats, Integers
 from replay.recording.blueprint import SCENE, TIMELINE, eye_of, scene_view
 from replay.recording.reader import Recording, read
 from replay.recording.rerun_file import RerunFile
@@ -71,7 +72,7 @@ class _Side:
         name = recording.provenance.scenario
         return _Side(SceneView(name, description="", links=poses.layout.links, bodies=tuple(bodies)), poses)
 
-    def extent(self) -> NDArray[np.float64]:
+    def extent(self) -> Floats:
         """Return points (n, 3) [m] in world coordinates that span the scene and where it moves."""
         return extent(self.scene, self.poses.link_poses)
 
@@ -174,7 +175,7 @@ def _log_marks(stream: Any, marks: list[_Mark]) -> None:
     _send(stream, [DIFFERENCE, "moments"], time, np.array([mark.at.frame for mark in marks]), columns)
 
 
-def _send(stream: Any, path: list[str], time: NDArray[np.int64], frames: NDArray[Any], *columns: Any) -> None:
+def _send(stream: Any, path: list[str], time: Integers, frames: NDArray[Any], *columns: Any) -> None:
     import rerun as rr
 
     index = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison.columns import SECOND
 from replay.comparison.diff import match_frames
@@ -13,10 +12,9 @@ from replay.comparison.difference import Difference, SignalDifference
 from replay.comparison.numbers import compare_numbers, compare_rotations
 from replay.comparison.rules import EXACT, Rules
 from replay.comparison.runs import RecordingPair
-from replay.comparison.signals import Column, groups, unify_categories
+from replay.comparison.signals import groups, unify_categories
+from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Kind
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT, LOWER = 720.0, 150.0, 70.0
 """Width of a drawing, height of its upper area (values) and of its lower one (differences) [px]."""
@@ -43,7 +41,7 @@ class ComparedCurve:
     candidate: Floats
     error: Floats
     limit: Floats
-    outside: NDArray[np.bool_]
+    outside: Flags
     steps: bool
 
 
@@ -111,7 +109,7 @@ class Curves:
         return ComparedCurve(self.seconds, x, y, errors.error, limit, errors.outside, steps=False)
 
 
-def _rows(column: Column, rows: NDArray[np.int64] | None) -> Column:
+def _rows(column: Column, rows: Integers | None) -> Column:
     return column if rows is None else column[rows]
 
 

@@ -15,6 +15,7 @@ from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles
 from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
+from replay.numerics.arrays import Floats
 from replay.numerics.rows import distinct_rows
 
 __all__ = [
@@ -30,7 +31,6 @@ __all__ = [
     "spheres_meet",
 ]
 
-Array = NDArray[np.float64]
 
 _EPS = float(np.finfo(np.float64).eps)
 _ULPS = 8.0
@@ -49,7 +49,7 @@ _LARGEST = 1e300
 class Sphere:
     """The points within `radius` [m] of `center` (3,) [m]."""
 
-    center: Array
+    center: Floats
     radius: float
 
 
@@ -57,8 +57,8 @@ class Sphere:
 class Aabb:
     """The points x with |x - center| <= half_widths on each axis; both (3,) [m]."""
 
-    center: Array
-    half_widths: Array
+    center: Floats
+    half_widths: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +71,12 @@ class Obb:
         axes: (3, 3), rows are unit axes, right-handed.
     """
 
-    center: Array
-    half_widths: Array
-    axes: Array
+    center: Floats
+    half_widths: Floats
+    axes: Floats
 
 
-def fit_sphere(points: Array) -> Sphere:
+def fit_sphere(points: Floats) -> Sphere:
     """Return the smallest sphere around points (n, 3) [m], n >= 1.
 
     Raises:
@@ -93,7 +93,7 @@ def fit_sphere(points: Array) -> Sphere:
     return Sphere(center, scale * reach * (1.0 + _ULPS * _EPS))
 
 
-def fit_aabb(points: Array) -> Aabb:
+def fit_aabb(points: Floats) -> Aabb:
     """Return the smallest axis-aligned box around points (n, 3) [m], n >= 1; errors as `fit_sphere`."""
     points = _checked("points", points)
     lower, upper = points.min(axis=0), points.max(axis=0)
@@ -103,7 +103,7 @@ def fit_aabb(points: Array) -> Aabb:
 
 
 def principal_obb(
-    points: Array,
+    points: Floats,
     *,
     triangles: NDArray[np.generic] | None = None,
     method: Literal["triangles", "vertices"] = "triangles",
@@ -137,7 +137,7 @@ def principal_obb(
 
 
 def fit_obb(
-    points: Array,
+    points: Floats,
     *,
     triangles: NDArray[np.generic] | None = None,
     method: Literal["triangles", "vertices"] = "triangles",
@@ -164,13 +164,13 @@ def fit_obb(
     return box
 
 
-def _volume(local: Array, axes: Array) -> float:
+def _volume(local: Floats, axes: Floats) -> float:
     """Return the volume of the box along axes around points of extent 1; flat boxes are compared by their area."""
     reach = _along(local[:, None], axes.T)
     return float(np.prod(np.maximum(reach.max(axis=0) - reach.min(axis=0), _FLAT)))
 
 
-def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array) -> Obb:
+def _tight(points: Floats, local: Floats, origin: Floats, scale: float, axes: Floats) -> Obb:
     """Return the box around the points along axes, sorted and signed in one way, containing them after rounding."""
     reach = _along(local[:, None], axes.T)
     order = np.argsort(reach.min(axis=0) - reach.max(axis=0), kind="stable")
@@ -191,18 +191,18 @@ def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array
     return Obb(center, scale * half_widths, axes)
 
 
-def _along(points: Array, axis: Array) -> Array:
+def _along(points: Floats, axis: Floats) -> Floats:
     """Return points . axis, the same on every machine; for several axes side by side their columns (3, k)."""
     return np.asarray(points[..., 0] * axis[0] + points[..., 1] * axis[1] + points[..., 2] * axis[2])
 
 
-def _signed(axis: Array) -> Array:
+def _signed(axis: Floats) -> Floats:
     """Return a unit axis or its opposite: the one whose largest component is positive."""
     axis = axis / np.sqrt(_along(axis, axis))
     return np.asarray(axis if axis[np.argmax(np.abs(axis))] > 0.0 else -axis)
 
 
-def _checked(name: str, points: Array) -> Array:
+def _checked(name: str, points: Floats) -> Floats:
     points = as_floats(name, points, (None, 3))
     if len(points) == 0:
         raise InvalidValue(name, "no points", "must have shape (n, 3) with n >= 1")
@@ -211,7 +211,7 @@ def _checked(name: str, points: Array) -> Array:
     return points
 
 
-def _corners(points: Array, triangles: NDArray[np.generic]) -> Array:
+def _corners(points: Floats, triangles: NDArray[np.generic]) -> Floats:
     try:
         triangles = np.asarray(triangles)
     except ValueError:

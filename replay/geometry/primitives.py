@@ -10,13 +10,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 FEWEST_SEGMENTS = 8
 """Segments of a full circle, however coarse the chord error asked for."""
@@ -155,7 +153,7 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
     return count if _sagitta(radius, 0.5 * span / count) <= chord_error else count + 1
 
 
-def _circle(radius: float, chord_error: float) -> tuple[Array, float]:
+def _circle(radius: float, chord_error: float) -> tuple[Floats, float]:
     """Return the corners (n, 2) of the polygon, counter-clockwise, and its sagitta."""
     _positive("radius", radius)
     count = _segments(radius, _FULL_TURN, chord_error)
@@ -164,7 +162,7 @@ def _circle(radius: float, chord_error: float) -> tuple[Array, float]:
     return rim, _sagitta(radius, math.pi / count)
 
 
-def _icosahedron() -> Array:
+def _icosahedron() -> Floats:
     """Return the 20 faces (20, 3, 3) of the icosahedron with corners on the unit sphere, seen from outside."""
     golden = 0.5 * (1.0 + math.sqrt(5.0))
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
@@ -184,18 +182,18 @@ def _icosahedron() -> Array:
 _ICOSAHEDRON = _icosahedron()
 
 
-def _sphere_face(face: Array, splits: int) -> Array:
+def _sphere_face(face: Floats, splits: int) -> Floats:
     """Return one face of the icosahedron as splits^2 triangles (n, 3, 3) with corners on the unit sphere.
 
     A point is i A + j B + k C, i + j + k = splits, pushed out. On an edge one term is zero, so both faces round alike
     and the seams close exactly.
     """
 
-    def corner(i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    def corner(i: Integers, j: Integers) -> Floats:
         k = splits - i - j
         raw = i[:, None] * face[0] + j[:, None] * face[1] + k[:, None] * face[2]
-        length: Array = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
-        pushed: Array = raw / length[:, None]
+        length: Floats = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
+        pushed: Floats = raw / length[:, None]
         return pushed
 
     i, j = (index.ravel() for index in np.meshgrid(np.arange(splits), np.arange(splits), indexing="ij"))
@@ -206,19 +204,19 @@ def _sphere_face(face: Array, splits: int) -> Array:
     return np.concatenate([upward, downward])
 
 
-def _deepest(triangles: Array) -> float:
+def _deepest(triangles: Floats) -> float:
     """Return the largest depth of triangles inscribed in the unit sphere below it."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
     return float(np.max(1.0 - np.sum(normal * a, axis=1) / np.sqrt(np.sum(normal * normal, axis=1))))
 
 
-def _quads(corners: Array) -> Array:
+def _quads(corners: Floats) -> Floats:
     """Return quadrilaterals (n, 4, 3) as triangles (2 n, 3, 3)."""
     return np.ascontiguousarray(corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3))
 
 
-def _distinct(triangles: Array) -> Array:
+def _distinct(triangles: Floats) -> Floats:
     return distinct_rows(triangles.reshape(-1, 3) + 0.0).rows
 
 

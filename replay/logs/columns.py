@@ -16,6 +16,7 @@ from replay.logs.mcap_chunks import MessageRun
 from replay.logs.mcap_reader import McapLog
 from replay.logs.protobuf import message_type
 from replay.logs.wire import MessageShape, shape_of
+from replay.numerics.arrays import Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Topic:
 
     name: str
     schema: str
-    time: NDArray[np.int64]
+    time: Integers
     columns: dict[str, NDArray[Any]]
     texts: Mapping[str, str | bytes]
     messages: tuple[Message, ...] | None
@@ -121,7 +122,7 @@ class _ChannelReader:
         """Forget what was read, and decode message by message from now on."""
         self._room_left.take(-sum(column.nbytes for column in getattr(self, "_columns", {}).values()))
         self._decoded = 0
-        self._times: list[NDArray[np.int64]] = []
+        self._times: list[Integers] = []
         self._shape: MessageShape | None = None
         self._columns: dict[str, NDArray[Any]] = {}
         self._count = 0

@@ -11,13 +11,13 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import RecordingError
 from replay.logs.csv_table import CsvTable, Format, unit_of
 from replay.logs.excerpt import EXCERPT
 from replay.logs.joint_log import JointLog, Series, leading_zeros, unrepeated
 from replay.logs.times import date_nanoseconds, nanoseconds
+from replay.numerics.arrays import Floats
 
 _WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
 _WITH_POINT = re.compile(r"[-+]?[0-9]*\.[0-9]*([eE][-+]?[0-9]+)?")
@@ -179,7 +179,7 @@ def _joint(heading: str) -> str:
     return unit_of(heading)[0].removesuffix(" position")
 
 
-def _values(cells: Sequence[str], decimal: str) -> NDArray[np.float64]:
+def _values(cells: Sequence[str], decimal: str) -> Floats:
     """Return the numbers in cells, NaN for what is none or not finite."""
     if decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]

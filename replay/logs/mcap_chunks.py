@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
 from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
 from replay.logs.work import Work
+from replay.numerics.arrays import Bytes, Integers
 
 MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
 """Bytes of a message record before its data."""
@@ -34,8 +34,8 @@ class MessageRun:
     """
 
     channel: int
-    time: NDArray[np.int64]
-    rows: NDArray[np.uint8] | None
+    time: Integers
+    rows: Bytes | None
     payloads: tuple[bytes, ...]
 
     def messages(self) -> list[bytes]:

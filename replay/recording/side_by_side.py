@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from replay.errors import ViewerError
+from replay.numerics.arrays import Floats
 from replay.recording import blueprint
 from replay.recording.own_folder import own_folder
 from replay.recording.rerun_file import RerunFile
-from replay.recording.scene_view import Floats
 
 _EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
 _SOMEWHERE = np.array([3.0, -4.0, 3.0]), np.zeros(3)  # where recordings that are not ours are looked at from

@@ -12,17 +12,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
 from replay.logs.mcap_writer import MessageRows
 from replay.logs.wire import MessageShape, Slot, shape_of
+from replay.numerics.arrays import Column
 from replay.numerics.columns import Field, components
 from replay.recording import messages
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
 
-Column = NDArray[Any]
 Columns = dict[str, Column]
 
 WORLD = "world"

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, StringConstraints
 
+from replay.collision.columns import MARGIN
 from replay.language.fields import Glob, Part, rejected
 from replay.language.units import Distance
 
@@ -32,7 +33,7 @@ class CollisionPart(Part):
 
     pairs: Literal["all", "none"] = "all"
     """"all": every pair of shapes on different links that are not joined by a joint; "none": no pair."""
-    margin: Annotated[Distance, AfterValidator(_reaches)] = 0.05
+    margin: Annotated[Distance, AfterValidator(_reaches)] = MARGIN
     """Clearances up to this one are computed [m] (model.collision.clearance: near)."""
     disable: tuple[DisablePart, ...] = ()
     """Pairs that are left out, each with its reason."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arrays import Floats, Integers
 
 _SECOND = 10**9
 _SAFE = 2**62
 
 
-def time_ns(rate: Fraction, begin: int, end: int) -> NDArray[np.int64]:
+def time_ns(rate: Fraction, begin: int, end: int) -> Integers:
     """Return the times (end - begin,) [ns] of frames begin..end-1: k / rate, rounded half to even.
 
     Args:
@@ -37,7 +37,7 @@ def time_ns(rate: Fraction, begin: int, end: int) -> NDArray[np.int64]:
     return np.array([round(Fraction(k) * _SECOND / rate) for k in range(begin, end)], dtype=np.int64)
 
 
-def seconds(rate: Fraction, begin: int, end: int) -> NDArray[np.float64]:
+def seconds(rate: Fraction, begin: int, end: int) -> Floats:
     """Return the times (end - begin,) [s] of frames begin..end-1: the doubles nearest to their nanoseconds.
 
     A frame is computed at the time that is recorded, so that a recording plays back to the same bits.

@@ -4,15 +4,15 @@ other entries are wrong, so that all problems are listed at once.
 
 from __future__ import annotations
 
-import fnmatch
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from replay.collision.globs import Globs
+from replay.collision.columns import MARGIN
 from replay.language.fields import Part
+from replay.language.globs import Globs, fits
 from replay.language.node import Node
 from replay.language.units import Distance
 from replay.scenario.collision import DisablePart
@@ -29,7 +29,7 @@ SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
 
 def matches(pattern: str, link: str, shape: str | None = None) -> bool:
     """Return whether a pattern matches a link's name or, with a shape, "link/shape"."""
-    return fnmatch.fnmatchcase(link, pattern) or (shape is not None and fnmatch.fnmatchcase(f"{link}/{shape}", pattern))
+    return fits(link, pattern) or (shape is not None and fits(f"{link}/{shape}", pattern))
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class Names:
     def margin(self) -> float | None:
         """collision.margin [m]."""
         if find(self.root, ("collision", "margin")) is None:
-            return 0.05
+            return MARGIN
         result: float | None = self._entry(Distance, "collision", "margin")
         return result
 

@@ -8,9 +8,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from replay.collision.pairs import CollisionBody, DisabledPair, Pair, plan_pairs
 from replay.errors import InvalidValue, MeshError, Problem, ScenarioError
 from replay.geometry import primitives
@@ -18,6 +15,7 @@ from replay.geometry.mesh import load_mesh
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import Linkage
 from replay.kinematics.motion import Script
+from replay.numerics.arrays import Floats, Integers
 from replay.scenario import frames, shapes
 from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.expectations import PairExpectation
@@ -108,11 +106,11 @@ class Scene:
         """Clearances up to this one are computed [m] when the model says near."""
         return self.scenario.collision.margin
 
-    def time_ns(self, begin: int, end: int) -> NDArray[np.int64]:
+    def time_ns(self, begin: int, end: int) -> Integers:
         """Return the times (end - begin,) [ns] of frames begin..end-1."""
         return frames.time_ns(Fraction(self.scenario.rate), begin, end)
 
-    def seconds(self, begin: int, end: int) -> NDArray[np.float64]:
+    def seconds(self, begin: int, end: int) -> Floats:
         """Return the times (end - begin,) [s] of frames begin..end-1."""
         return frames.seconds(Fraction(self.scenario.rate), begin, end)
 

@@ -9,10 +9,11 @@ import pytest
 from replay.comparison import rules_file, wording
 from replay.comparison.diff import compare
 from replay.comparison.difference import DiffVerdict
-from replay.comparison.rules import EXACT, Rule, Tolerance, literal_pattern
+from replay.comparison.rules import EXACT, Rule, Tolerance
 from replay.comparison.rules_file import read_rules, schema_text
 from replay.comparison.signals import groups
 from replay.errors import InvalidValue, ScenarioError
+from replay.language.globs import literal_glob
 from replay.scenario.yaml_text import parse
 from tests.comparison import made_up
 
@@ -177,9 +178,9 @@ def test_shipped_rules_give_every_signal_a_tolerance_with_a_reason():
     assert compare(baseline, made_up.altered(baseline, more), rules=rules).verdict is DiffVerdict.DIFFERENT
 
 
-def test_a_literal_pattern_matches_its_name_alone():
+def test_a_literal_glob_matches_its_name_alone():
     name = "/distance/what[1]*?/distance"
-    exact = Rule((literal_pattern(name),), EXACT, "r")
+    exact = Rule((literal_glob(name),), EXACT, "r")
     assert exact.matches(name)
     assert not exact.matches("/distance/what1ab/distance")
 

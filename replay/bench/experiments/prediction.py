@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.experiments.measured import (
     DELTA_STRAY,
@@ -24,11 +23,10 @@ from replay.bench.experiments.measured import (
 )
 from replay.bench.experiments.tables import Cell, Table
 from replay.logs.curve_csv import Curve
+from replay.numerics.arrays import Floats
 from replay.scenario.calibration import CurveFit, SensorPath, fit_curve
 from replay.scenario.curve_plot import Line, Panel
 from replay.sensing.calibration import response
-
-Floats = NDArray[np.float64]
 
 FITTED_SIDE = 20
 """Edge length [cm] of the target plate that experiment II fits."""

@@ -28,16 +28,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.surface_boxes import AXES, CENTRE, HALVES, SHORT
 from replay.geometry.wide_tree import LANES
+from replay.numerics.arrays import Floats, Singles
 from replay.numerics.jit import kernel
 from replay.sensing.distance.cone import EPSILON, Cone
 from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 
 _THIRD = 1.0 / 3.0
 

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import EPSILON
 from replay.sensing.distance.exact import same_pose
@@ -24,13 +24,11 @@ from replay.sensing.distance.query import SLACK
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 from replay.sensing.distance.vectors import Vector, accurate_cross, cross, dot, norm, subtract
 
-Array = NDArray[np.float64]
-
 _IN_PLANE = 16.0 * EPSILON
 """Rounding of what d · ((b - a) × (c - a)) is made of, as part of the farthest corner times the longest edge at a."""
 
 
-def cap_directions(aperture: float, count: int) -> Array:
+def cap_directions(aperture: float, count: int) -> Floats:
     """Return the unit directions (count, 3) of the rays in the sensor's frame, axis +z.
 
     Args:
@@ -95,13 +93,13 @@ def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> floa
 
 @kernel
 def _nearest_hit(
-    triangles: Array,
+    triangles: Floats,
     tree: Tree,
     origin: Vector,
     d: Vector,
     rounding: float,
     limit: float,
-    stack: NDArray[np.int64],
+    stack: Integers,
     slack: float,
 ) -> tuple[float, int]:
     """Return distance and triangle of the first hit nearer than the limit; inf and -1 when there is none."""
@@ -134,11 +132,11 @@ def _nearest_hit(
 @entry(float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1], float64[:, ::1], float64[::1], float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_rays(
-    triangles: Array,
+    triangles: Floats,
     tree: Tree,
-    T_target_sensor: Array,
-    directions: Array,
-    rounding: Array,
+    T_target_sensor: Floats,
+    directions: Floats,
+    rounding: Floats,
     reach: float,
     target: int,
     nearest: Nearest,

@@ -28,15 +28,13 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, EPSILON, FOOT, NOTHING
 from replay.sensing.distance.exact import axis_of, same_pose
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
-
-Array = NDArray[np.float64]
 
 _VANISHING = 8.0 * EPSILON
 """Rounding of the quadratic's leading coefficient, as part of the direction's square: less than this is nothing."""
@@ -116,7 +114,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
 @entry(float64[:, :, ::1], float64[:, :, ::1], float64, float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_thesis(
-    triangles: Array, T_target_sensor: Array, cos_half: float, reach: float, target: int, nearest: Nearest
+    triangles: Floats, T_target_sensor: Floats, cos_half: float, reach: float, target: int, nearest: Nearest
 ) -> None:
     """As `replay.sensing.distance.exact.sweep_exact`, by the thesis's steps on every triangle."""
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, NOTHING
