@@ -16,11 +16,10 @@ from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.signals import Group, Signal, unify_categories
 from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Field, Kind
+from replay.numerics.constants import SECOND
 
 _BLOCK_VALUES = 1 << 20
 """Values that are compared at once while equal columns are looked for, which bounds the temporary memory to 16 MiB."""
-
-SECOND = 1e9
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from replay.comparison.absences import absences, with_new_names
-from replay.comparison.columns import SECOND, Gates, MatchedFrames, compare_groups
+from replay.comparison.columns import Gates, MatchedFrames, compare_groups
 from replay.comparison.difference import Change, Difference, Frames, Moment, SignalDifference
 from replay.comparison.provenance import file_changes, provenance_changes
 from replay.comparison.rules import Rule, Rules
 from replay.comparison.signals import Group, groups
 from replay.numerics.arrays import Integers
+from replay.numerics.constants import SECOND
 from replay.recording.reader import Recording
 
 FRAMES = "/frames"

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.comparison.columns import SECOND
 from replay.comparison.diff import match_frames
 from replay.comparison.difference import Difference, SignalDifference
 from replay.comparison.numbers import compare_numbers, compare_rotations
@@ -15,6 +14,7 @@ from replay.comparison.runs import RecordingPair
 from replay.comparison.signals import groups, unify_categories
 from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Kind
+from replay.numerics.constants import SECOND
 
 WIDTH, HEIGHT, LOWER = 720.0, 150.0, 70.0
 """Width of a drawing, height of its upper area (values) and of its lower one (differences) [px]."""

@@ -16,6 +16,7 @@ from replay.geometry.principal_axes import covariance_of_points, covariance_of_t
 from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
 from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.rows import distinct_rows
 
 __all__ = [
@@ -32,7 +33,6 @@ __all__ = [
 ]
 
 
-_EPS = float(np.finfo(np.float64).eps)
 _ULPS = 8.0
 """Volumes are this many roundings of their extent larger than the points' computed distances ask for.
 
@@ -90,7 +90,7 @@ def fit_sphere(points: Floats) -> Sphere:
     center = origin + scale * smallest_ball_centre(local)
     x, y, z = ((points - center) / scale).T
     reach = float(np.sqrt(np.max(x * x + y * y + z * z)))
-    return Sphere(center, scale * reach * (1.0 + _ULPS * _EPS))
+    return Sphere(center, scale * reach * (1.0 + _ULPS * EPSILON))
 
 
 def fit_aabb(points: Floats) -> Aabb:
@@ -99,7 +99,7 @@ def fit_aabb(points: Floats) -> Aabb:
     lower, upper = points.min(axis=0), points.max(axis=0)
     center = 0.5 * lower + 0.5 * upper
     half_widths = np.maximum(upper - center, center - lower)
-    return Aabb(center, half_widths * (1.0 + _ULPS * _EPS))
+    return Aabb(center, half_widths * (1.0 + _ULPS * EPSILON))
 
 
 def principal_obb(
@@ -159,7 +159,7 @@ def fit_obb(
     """
     box = principal_obb(points, triangles=triangles, method=method)
     local, origin, scale = to_unit_box(_checked("points", points))
-    if _volume(local, np.eye(3)) < _volume(local, box.axes) * (1.0 - _ULPS * _EPS):
+    if _volume(local, np.eye(3)) < _volume(local, box.axes) * (1.0 - _ULPS * EPSILON):
         return _tight(_checked("points", points), local, origin, scale, np.eye(3))
     return box
 
@@ -186,7 +186,7 @@ def _tight(points: Floats, local: Floats, origin: Floats, scale: float, axes: Fl
         middle += (0.5 * low + 0.5 * high) * axis
     center = origin + scale * middle
     relative = (points - center) / scale
-    slack = _ULPS * _EPS * 2.0 * float(np.max(np.abs(relative)))
+    slack = _ULPS * EPSILON * 2.0 * float(np.max(np.abs(relative)))
     half_widths = np.abs(_along(relative[:, None], axes.T)).max(axis=0) + slack
     return Obb(center, scale * half_widths, axes)
 

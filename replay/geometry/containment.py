@@ -27,9 +27,9 @@ from replay.geometry.closing import caps, openness
 from replay.geometry.solid_angle import winding_number
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, triangle_tree
 from replay.numerics.arrays import Flags, Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
 
-_EPS = float(np.finfo(np.float64).eps)
 _UNSURE = -(2**31)
 
 
@@ -108,7 +108,7 @@ def inside(point: Floats, triangles: Floats, tree: Tree, closing: Floats) -> int
     magnitude = 0.0
     for axis in range(3):
         magnitude = max(magnitude, abs(tree.lower[0, axis]), abs(tree.upper[0, axis]))
-    if distance_to_surface(point, triangles, tree) <= 64.0 * _EPS * magnitude:
+    if distance_to_surface(point, triangles, tree) <= 64.0 * EPSILON * magnitude:
         return 1
     return 1 if abs(winding_number(point, triangles)) > 0.5 else 0
 
@@ -127,7 +127,7 @@ def _crossings(point: Floats, d: Floats, triangles: Floats, tree: Tree) -> int:
             first = (tree.lower[node, axis] - point[axis]) / d[axis]
             last = (tree.upper[node, axis] - point[axis]) / d[axis]
             near, far = max(near, min(first, last)), min(far, max(first, last))
-        if near > far * (1.0 + 8.0 * _EPS):  # the factor covers the rounding of near and far, both >= 0
+        if near > far * (1.0 + 8.0 * EPSILON):  # the factor covers the rounding of near and far, both >= 0
             continue
         if tree.second[node] >= 0:
             waiting[size], waiting[size + 1] = tree.second[node], node + 1
@@ -156,11 +156,11 @@ def _crossing(point: Floats, d: Floats, triangle: Floats) -> int:
     u = d[0] * nx + d[1] * ny + d[2] * nz
     v = d[0] * (cy * az - cz * ay) + d[1] * (cz * ax - cx * az) + d[2] * (cx * ay - cy * ax)
     w = d[0] * (ay * bz - az * by) + d[1] * (az * bx - ax * bz) + d[2] * (ax * by - ay * bx)
-    eu, ev, ew = 16.0 * _EPS * b * c, 16.0 * _EPS * c * a, 16.0 * _EPS * a * b
+    eu, ev, ew = 16.0 * EPSILON * b * c, 16.0 * EPSILON * c * a, 16.0 * EPSILON * a * b
     if (u > eu or v > ev or w > ew) and (u < -eu or v < -ev or w < -ew):
         return 0
     n = ax * nx + ay * ny + az * nz
-    en = 16.0 * _EPS * a * b * c
+    en = 16.0 * EPSILON * a * b * c
     if u > eu and v > ev and w > ew:
         return 1 if n > en else (0 if n < -en else _UNSURE)
     if u < -eu and v < -ev and w < -ew:

@@ -21,6 +21,7 @@ from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.geometry.weld import weld, weld_copies
 from replay.geometry.winding import Topology, corner_indices, topology
 from replay.numerics.arrays import Flags, Floats, Integers
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
 
@@ -175,7 +176,7 @@ def _have_area(triangles: Floats) -> Flags:
     longest = np.max(np.abs(edges), axis=(0, 2))
     safe = np.where(longest > 0.0, longest, 1.0)[:, None]
     cross = np.cross(edges[0] / safe, edges[2] / safe)
-    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * np.finfo(np.float64).eps))
+    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * EPSILON))
 
 
 def _convex_corners(triangles: Floats) -> Floats:

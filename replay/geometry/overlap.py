@@ -7,12 +7,12 @@ times their sum is given in favour of meeting. It also covers axes and poses tha
 
 from __future__ import annotations
 
-import numpy as np
-
 from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import inlined_kernel, leaf_kernel
+from replay.numerics.triples import Triple
 
-_SLACK = 64.0 * float(np.finfo(np.float64).eps)
+_SLACK = 64.0 * EPSILON
 
 
 @leaf_kernel
@@ -93,11 +93,8 @@ def obbs_meet(
     return not _edges_apart(t, r2, s2, s0, s1, half_a, half_b[0], half_b[1], slack)
 
 
-Vector = tuple[float, float, float]
-
-
 @inlined_kernel
-def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Floats, half_b: float) -> bool:
+def _face_apart(t: Triple, r: Triple, s: Triple, half_a: Floats, half_b: float) -> bool:
     reach = half_b + half_a[0] * s[0] + half_a[1] * s[1] + half_a[2] * s[2]
     distance: float = abs(t[0] * r[0] + t[1] * r[1] + t[2] * r[2])
     apart: bool = distance > reach
@@ -106,11 +103,11 @@ def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Floats, half_b: float) 
 
 @inlined_kernel
 def _edges_apart(
-    t: Vector,
-    r: Vector,
-    s: Vector,
-    s_m: Vector,
-    s_n: Vector,
+    t: Triple,
+    r: Triple,
+    s: Triple,
+    s_m: Triple,
+    s_n: Triple,
     half_a: Floats,
     half_m: float,
     half_n: float,
@@ -126,7 +123,7 @@ def _edges_apart(
 
 
 @inlined_kernel
-def _turned(axes: Floats, v: Vector) -> Vector:
+def _turned(axes: Floats, v: Triple) -> Triple:
     return (
         axes[0, 0] * v[0] + axes[0, 1] * v[1] + axes[0, 2] * v[2],
         axes[1, 0] * v[0] + axes[1, 1] * v[1] + axes[1, 2] * v[2],
@@ -135,7 +132,7 @@ def _turned(axes: Floats, v: Vector) -> Vector:
 
 
 @inlined_kernel
-def _column(axes_a: Floats, axis_b: Floats, T_a_b: Floats) -> Vector:
+def _column(axes_a: Floats, axis_b: Floats, T_a_b: Floats) -> Triple:
     """Return (a_i . b) for one axis b of box b."""
     turned = (
         T_a_b[0, 0] * axis_b[0] + T_a_b[0, 1] * axis_b[1] + T_a_b[0, 2] * axis_b[2],

@@ -14,13 +14,13 @@ import numpy as np
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import FULL_TURN
 from replay.numerics.rows import distinct_rows
 
 FEWEST_SEGMENTS = 8
 """Segments of a full circle, however coarse the chord error asked for."""
 
 _MOST_TRIANGLES = 2_000_000
-_FULL_TURN = 2.0 * math.pi
 
 
 def cuboid(size: Sequence[float]) -> Solid:
@@ -110,9 +110,9 @@ def arc(radius: float, span: float, width: float, thickness: float, chord_error:
         _positive(name, value)
     if thickness >= 2.0 * radius:
         raise InvalidValue("thickness", thickness, f"must be below twice the radius, {2.0 * radius} m")
-    if span > _FULL_TURN * (1.0 + 1e-12):
+    if span > FULL_TURN * (1.0 + 1e-12):
         raise InvalidValue("span", span, "must be at most 2 pi rad")
-    full = span >= _FULL_TURN * (1.0 - 1e-12)
+    full = span >= FULL_TURN * (1.0 - 1e-12)
     outer = radius + 0.5 * thickness
     inner = radius - 0.5 * thickness
     count = _segments(outer, span, chord_error)
@@ -146,7 +146,7 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
     """Return the fewest equal segments of an arc whose sagitta is at most chord_error."""
     _positive("chord_error", chord_error)
     half_angle = 2.0 * math.asin(math.sqrt(min(0.5 * chord_error / radius, 0.5)))
-    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / _FULL_TURN - 1e-9))
+    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / FULL_TURN - 1e-9))
     needed = 0.5 * span / half_angle
     _check_count("chord_error", chord_error, 8.0 * needed)
     count = max(fewest, math.ceil(needed))
@@ -156,8 +156,8 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
 def _circle(radius: float, chord_error: float) -> tuple[Floats, float]:
     """Return the corners (n, 2) of the polygon, counter-clockwise, and its sagitta."""
     _positive("radius", radius)
-    count = _segments(radius, _FULL_TURN, chord_error)
-    angles = [_FULL_TURN * k / count for k in range(count)]
+    count = _segments(radius, FULL_TURN, chord_error)
+    angles = [FULL_TURN * k / count for k in range(count)]
     rim = np.array([[radius * math.cos(angle), radius * math.sin(angle)] for angle in angles])
     return rim, _sagitta(radius, math.pi / count)
 

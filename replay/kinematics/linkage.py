@@ -11,8 +11,12 @@ import numpy as np
 from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 
-POSE_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+WORLD = "world"
+"""Name of the frame that all links are placed in; no link has it."""
+
+POSE_ROUNDING = 8.0 * EPSILON
 """Rounding of the place of one link in another, as part of the way between them (`LinkPoses.way`).
 
 Chains of up to eight links, turned every way, were off by at most 1.1 epsilon of the sum of their steps.

@@ -17,6 +17,7 @@ import numpy as np
 
 from replay import limits
 from replay.errors import InvalidValue, LimitError
+from replay.kinematics.linkage import WORLD
 from replay.language.globs import fits
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
@@ -25,7 +26,6 @@ from replay.numerics.arrays import Column
 from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
-from replay.recording.topics import WORLD
 from replay.sensing.kinds import KINDS
 from replay.simulation import Layout
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from replay.errors import InvalidValue
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import SECOND
 
-_SECOND = 10**9
 _SAFE = 2**62
 
 
@@ -25,7 +25,7 @@ def time_ns(rate: Fraction, begin: int, end: int) -> Integers:
     """
     # k / rate = k (q + r / n) ns with q, r = divmod(10^9 d, n) for a rate of n / d
     n, d = rate.numerator, rate.denominator
-    q, r = divmod(_SECOND * d, n)
+    q, r = divmod(SECOND * d, n)
     if end * (q + 1) >= _SAFE:
         raise InvalidValue("end", end, f"frames at {rate} Hz that late do not fit into 64 bits of nanoseconds")
     if end * r < _SAFE and 2 * n < _SAFE:
@@ -34,7 +34,7 @@ def time_ns(rate: Fraction, begin: int, end: int) -> Integers:
         twice = 2 * ((k * r) % n)
         up = (twice > n) | ((twice == n) & (whole % 2 == 1))
         return np.where(up, whole + 1, whole)
-    return np.array([round(Fraction(k) * _SECOND / rate) for k in range(begin, end)], dtype=np.int64)
+    return np.array([round(Fraction(k) * SECOND / rate) for k in range(begin, end)], dtype=np.int64)
 
 
 def seconds(rate: Fraction, begin: int, end: int) -> Floats:

@@ -17,12 +17,13 @@ from numba import float64, int64
 
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
-from replay.sensing.distance.cone import EPSILON
+from replay.numerics.triples import Triple, cross, dot, minus, norm
 from replay.sensing.distance.exact import same_pose
+from replay.sensing.distance.products import accurate_cross
 from replay.sensing.distance.query import SLACK
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
-from replay.sensing.distance.vectors import Vector, accurate_cross, cross, dot, norm, subtract
 
 _IN_PLANE = 16.0 * EPSILON
 """Rounding of what d · ((b - a) × (c - a)) is made of, as part of the farthest corner times the longest edge at a."""
@@ -46,7 +47,7 @@ def cap_directions(aperture: float, count: int) -> Floats:
 
 
 @kernel
-def _box_entry(tree: Tree, node: int, origin: Vector, d: Vector, slack: float) -> float:
+def _box_entry(tree: Tree, node: int, origin: Triple, d: Triple, slack: float) -> float:
     """Return where the ray enters a node's box, grown by the slack; inf when it does not."""
     entry, leave = 0.0, np.inf
     for axis in range(3):
@@ -61,14 +62,14 @@ def _box_entry(tree: Tree, node: int, origin: Vector, d: Vector, slack: float) -
 
 
 @kernel
-def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> float:
+def ray_hit(a: Triple, b: Triple, c: Triple, d: Triple, rounding: float) -> float:
     """Return how far along the unit direction d from the origin the triangle is hit, from either side; inf when not.
 
     The ray passes each edge on the side that the sign of d · (a × b) tells, so it cannot slip between two triangles.
     One in the triangle's plane, to rounding, hits nothing: where it meets the plane is noise. A hit no farther than the
     rounding of the origin [m], before or behind it, is on it.
     """
-    ab, ac = subtract(b, a), subtract(c, a)
+    ab, ac = minus(b, a), minus(c, a)
     normal = cross(ab, ac)
     turn = dot(d, normal)
     extent = max(norm(a), norm(b), norm(c))
@@ -95,8 +96,8 @@ def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> floa
 def _nearest_hit(
     triangles: Floats,
     tree: Tree,
-    origin: Vector,
-    d: Vector,
+    origin: Triple,
+    d: Triple,
     rounding: float,
     limit: float,
     stack: Integers,
