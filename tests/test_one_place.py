@@ -22,7 +22,7 @@ def names_in(tree: ast.Module) -> set[str]:
 
 
 def test_no_two_classes_have_the_same_name():
-    """Give one of them a longer name: what is written in YAML ends in Part, what is in a file begins with its format."""
+    """Else give one a longer name: what is written in YAML ends in Part, what is in a file begins with its format."""
     places = defaultdict(list)
     for path, tree in TREES.items():
         for node in ast.walk(tree):
