@@ -33,9 +33,8 @@ SCENE = "scene"
 def simulation_of(method):
     """The scene under a version of a method, such as "distance.rays"; defaults for all else."""
     kind, *option = method.split(".")
-    model = Model.model_validate(
-        {kind: {"method": option[0]} if len(option) == 1 else dict([option])} if option else {}
-    )
+    choice = {option[0]: option[1]} if len(option) == 2 else {"method": "".join(option)}
+    model = Model.model_validate({} if method == SCENE else {kind: choice})
     return Simulation(build(load(FOLDER / "scene.yaml"), model=model))
 
 
@@ -46,7 +45,9 @@ def signals_of(method):
         for column, signal in enumerate(group.signals):
             values = group.values[:, column]
             if group.field.kind is Kind.ROTATION:
-                yield from ((f"{signal.full_name}.{axis}", part, False) for axis, part in zip("xyzw", values.T))
+                yield from (
+                    (f"{signal.full_name}.{axis}", part, False) for axis, part in zip("xyzw", values.T, strict=True)
+                )
             else:
                 yield signal.full_name, values, group.field.kind.is_state
 
@@ -117,9 +118,8 @@ def advice(method):
     place = f"METHOD_REVISIONS[{method!r}] in replay/scenario/methods.py"
     if kind != "collision":
         place = f"revisions[{choice!r}] in replay/sensing/{kind}/kind.py"
-    return (
-        f"if that is meant, raise {place} from {revision} to {revision + 1}, then `make freeze`; if not, it is a fault"
-    )
+    meant = f"raise {place} from {revision} to {revision + 1}, then `make freeze`"
+    return f"if that is meant, {meant}; if not, it is a fault"
 
 
 def key_of(method):
