@@ -15,15 +15,15 @@ from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float
 from replay.numerics.jit import entries_of
-from replay.sensing.capacitive import clusters
-from replay.sensing.capacitive.clusters import Clusters, make_clusters
+from replay.sensing.capacitive.tree import clusters
+from replay.sensing.capacitive.tree.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.divider import output_voltage
 from replay.sensing.capacitive.integral import check_splits
 from replay.sensing.capacitive.plate_inside import plates_inside
 from replay.sensing.capacitive.sensor import CapacitiveSensor
-from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 from replay.sensing.target import Target
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import kernel
-from replay.sensing.capacitive.lanes import COLUMNS, LANES
-from replay.sensing.capacitive.part_queue import RULES, Queue, new_queue
+from replay.sensing.capacitive.tree.lanes import COLUMNS, LANES
+from replay.sensing.capacitive.tree.part_queue import RULES, Queue, new_queue
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.cluster_bounds import CLOSEST
-from replay.sensing.capacitive.clusters import REACH, SIZE, SPREAD, TRIANGLE_COLUMNS
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.tree.cluster_bounds import CLOSEST
+from replay.sensing.capacitive.tree.clusters import REACH, SIZE, SPREAD, TRIANGLE_COLUMNS
+from replay.sensing.capacitive.tree.lanes import (
     ALLOWED,
     ERROR,
     FIRST_RULE,
@@ -25,8 +25,8 @@ from replay.sensing.capacitive.lanes import (
     padded,
 )
 from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, faces_centre, region_of
-from replay.sensing.capacitive.point_sums import corner_in_lanes
-from replay.sensing.capacitive.triangle_rules import (
+from replay.sensing.capacitive.tree.point_sums import corner_in_lanes
+from replay.sensing.capacitive.tree.triangle_rules import (
     NO_RULE,
     PART_ABOVE,
     POINTS_1,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import CORNERS, SIZE
-from replay.sensing.capacitive.lanes import FROM, LANES, SUM, padded
+from replay.sensing.capacitive.tree.clusters import CORNERS, SIZE
+from replay.sensing.capacitive.tree.lanes import FROM, LANES, SUM, padded
 from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, place_corner, sides_of
 
 Floats = NDArray[np.float64]

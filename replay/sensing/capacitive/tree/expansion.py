@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.clusters import FOURTH, SECOND, THIRD
-from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.tree.clusters import FOURTH, SECOND, THIRD
+from replay.sensing.capacitive.tree.lanes import LANES
 from replay.sensing.capacitive.placed_plate import Triple
 
 Floats = NDArray[np.float64]

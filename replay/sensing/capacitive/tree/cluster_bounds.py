@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import (
+from replay.sensing.capacitive.tree.clusters import (
     AREA,
     CENTROID,
     FARTHEST_PLANE,
@@ -25,7 +25,7 @@ from replay.sensing.capacitive.clusters import (
     RADIUS,
     SIGMA,
 )
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.tree.lanes import (
     DROP,
     ERROR,
     FOUND,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.cluster_bounds import CLOSEST
+from replay.sensing.capacitive.tree.cluster_bounds import CLOSEST
 from replay.sensing.capacitive.placed_plate import Triple, beyond_borders
 
 POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE, PART_ABOVE = range(6)

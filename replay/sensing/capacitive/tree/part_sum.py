@@ -9,14 +9,14 @@ from replay.numerics.double_double import two_sum
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.clusters import MOMENT_COLUMNS, NUMBER, PLACE, TRIANGLE_COLUMNS, WHOLE, Clusters
-from replay.sensing.capacitive.expansion import mean_by_moments
-from replay.sensing.capacitive.lanes import FOUND, LANES, REGION, SHIFT, SUM, load, padded
-from replay.sensing.capacitive.part_queue import CLUSTER, PART, RULE, RULES, VALUES, slots_used
+from replay.sensing.capacitive.tree.clusters import MOMENT_COLUMNS, NUMBER, PLACE, TRIANGLE_COLUMNS, WHOLE, Clusters
+from replay.sensing.capacitive.tree.expansion import mean_by_moments
+from replay.sensing.capacitive.tree.lanes import FOUND, LANES, REGION, SHIFT, SUM, load, padded
+from replay.sensing.capacitive.tree.part_queue import CLUSTER, PART, RULE, RULES, VALUES, slots_used
 from replay.sensing.capacitive.placed_plate import PlacedPlate, place, sides_of
-from replay.sensing.capacitive.point_sums import TRIANGLE_3, sum_by_points
-from replay.sensing.capacitive.room import Room
-from replay.sensing.capacitive.triangle_rules import PART_ABOVE, POINTS_1, POINTS_3, POINTS_7, POINTS_16
+from replay.sensing.capacitive.tree.point_sums import TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.tree.room import Room
+from replay.sensing.capacitive.tree.triangle_rules import PART_ABOVE, POINTS_1, POINTS_3, POINTS_7, POINTS_16
 
 Floats = NDArray[np.float64]
 

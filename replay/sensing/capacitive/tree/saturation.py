@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import BEGIN, CENTROID, END, RADIUS, SECOND_CHILD, SIZE, Clusters
+from replay.sensing.capacitive.tree.clusters import BEGIN, CENTROID, END, RADIUS, SECOND_CHILD, SIZE, Clusters
 from replay.sensing.capacitive.contact import SATURATED, contact
 from replay.sensing.capacitive.placed_plate import (
     PlacedPlate,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.jit import entry, kernel, leaf_kernel, record
-from replay.sensing.capacitive.moments import DEGREE, add_moments, add_triangle_moments, move_moments
+from replay.sensing.capacitive.tree.moments import DEGREE, add_moments, add_triangle_moments, move_moments
 from replay.sensing.capacitive.triangle_sum import triangle_areas
 
 Floats = NDArray[np.float64]

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.budget import Budget, Tally, is_met
-from replay.sensing.capacitive.cluster_bounds import faces, judge_nodes
-from replay.sensing.capacitive.clusters import BEGIN, END, SECOND_CHILD, Clusters
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.tree.budget import Budget, Tally, is_met
+from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes
+from replay.sensing.capacitive.tree.clusters import BEGIN, END, SECOND_CHILD, Clusters
+from replay.sensing.capacitive.tree.lanes import (
     ALLOWED,
     DROP,
     ERROR,
@@ -24,11 +24,11 @@ from replay.sensing.capacitive.lanes import (
     RULE_FOUND,
     VERDICT,
 )
-from replay.sensing.capacitive.part_queue import CLUSTER, FREE, PART, RULE, doubt_and_least, pop, push
+from replay.sensing.capacitive.tree.part_queue import CLUSTER, FREE, PART, RULE, doubt_and_least, pop, push
 from replay.sensing.capacitive.placed_plate import PlacedPlate
-from replay.sensing.capacitive.room import Room
-from replay.sensing.capacitive.triangle_bounds import judge_triangles
-from replay.sensing.capacitive.triangle_rules import POINTS_1
+from replay.sensing.capacitive.tree.room import Room
+from replay.sensing.capacitive.tree.triangle_bounds import judge_triangles
+from replay.sensing.capacitive.tree.triangle_rules import POINTS_1
 
 Floats = NDArray[np.float64]
 

@@ -44,17 +44,17 @@ from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import entry, kernel, leaf_kernel
-from replay.sensing.capacitive.budget import Tally, budget_of
-from replay.sensing.capacitive.clusters import CLUSTERS_TYPE, Clusters
-from replay.sensing.capacitive.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.lanes import LANES
-from replay.sensing.capacitive.opening import refine
-from replay.sensing.capacitive.part_queue import empty
-from replay.sensing.capacitive.part_sum import sum_of_parts
+from replay.sensing.capacitive.tree.budget import Tally, budget_of
+from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
+from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
+from replay.sensing.capacitive.tree.lanes import LANES
+from replay.sensing.capacitive.tree.opening import refine
+from replay.sensing.capacitive.tree.part_queue import empty
+from replay.sensing.capacitive.tree.part_sum import sum_of_parts
 from replay.sensing.capacitive.placed_plate import PlacedPlate, placed_plate
-from replay.sensing.capacitive.room import Room, new_room
-from replay.sensing.capacitive.saturation import any_saturates, suspects
-from replay.sensing.capacitive.triangle_pieces import Pieces, new_pieces
+from replay.sensing.capacitive.tree.room import Room, new_room
+from replay.sensing.capacitive.tree.saturation import any_saturates, suspects
+from replay.sensing.capacitive.tree.triangle_pieces import Pieces, new_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel
-from replay.sensing.capacitive.lanes import ERROR, FOUND, LANES, LEAST
-from replay.sensing.capacitive.triangle_rules import NO_RULE, PART_ABOVE
+from replay.sensing.capacitive.tree.lanes import ERROR, FOUND, LANES, LEAST
+from replay.sensing.capacitive.tree.triangle_rules import NO_RULE, PART_ABOVE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import CORNERS, SIZE
+from replay.sensing.capacitive.tree.clusters import CORNERS, SIZE
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.lanes import LANES
+from replay.sensing.capacitive.tree.lanes import LANES
 from replay.sensing.capacitive.placed_plate import Triple
 
 Floats = NDArray[np.float64]

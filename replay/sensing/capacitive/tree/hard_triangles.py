@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 from replay.numerics.log_difference import mean_inverse_linear
-from replay.sensing.capacitive.clusters import CORNERS, REACH, SIZE, SPREAD
+from replay.sensing.capacitive.tree.clusters import CORNERS, REACH, SIZE, SPREAD
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import integral_over_triangle
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.tree.lanes import (
     ALLOWED,
     ERROR,
     FIRST_RULE,
@@ -33,11 +33,11 @@ from replay.sensing.capacitive.lanes import (
     padded,
 )
 from replay.sensing.capacitive.placed_plate import PlacedPlate, faces_centre, place_triangle, write_triangle
-from replay.sensing.capacitive.point_sums import TRIANGLE_3, sum_by_points
-from replay.sensing.capacitive.saturation import may_touch
-from replay.sensing.capacitive.triangle_bounds import judge_loaded
-from replay.sensing.capacitive.triangle_pieces import MOST_PIECES, OWNER, PIECE, Pieces, cut, quarter, write_piece
-from replay.sensing.capacitive.triangle_rules import POINTS_1, POINTS_3
+from replay.sensing.capacitive.tree.point_sums import TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.tree.saturation import may_touch
+from replay.sensing.capacitive.tree.triangle_bounds import judge_loaded
+from replay.sensing.capacitive.tree.triangle_pieces import MOST_PIECES, OWNER, PIECE, Pieces, cut, quarter, write_piece
+from replay.sensing.capacitive.tree.triangle_rules import POINTS_1, POINTS_3
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.clusters import AREA, CENTROID, MEAN2
+from replay.sensing.capacitive.tree.clusters import AREA, CENTROID, MEAN2
 from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""A body's sum with a stated tolerance: far clusters by their moments, near triangles exactly."""
