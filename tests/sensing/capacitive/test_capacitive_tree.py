@@ -6,7 +6,8 @@ import pytest
 from replay.geometry.primitives import sphere
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.tree.clusters import (
+from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
     FOURTH,
@@ -20,7 +21,6 @@ from replay.sensing.capacitive.tree.clusters import (
     SECOND,
     SIGMA,
     SIZE,
-    make_clusters,
 )
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas

@@ -13,33 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel
+from replay.sensing.capacitive.placed_plate import Triple, place_corner
+from replay.sensing.capacitive.tree.registers import CORNERS, LANES
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.floating[Any]]
 Ints = NDArray[np.int64]
-
-LANES = 64
-COLUMNS = 52
-"""Size of `lanes`: (COLUMNS x LANES,). Its first 40 columns hold a row of `Clusters.outlines`, `triangles` or
-`moments`, or of a pool of pieces, in the columns it has there."""
-
-FROM = 16
-"""First of nine columns beside a triangle's row: u, v and z [m] of its corners, as a point rule takes the distance."""
-
-FOUND = 40
-ERROR, SHIFT, LEAST, REGION = range(4)
-"""What is found of a node or triangle, in the columns from FOUND on: the bound of its error [m], what its expansion or
-rule is corrected by [m], a lower bound of its integral [m], and the region it is expanded in, see `region_of`."""
-
-VERDICT, RULE_FOUND, FIRST_RULE, ALLOWED = range(44, 48)
-"""Columns: the verdict on a node or triangle; a triangle's rule, the first that comes into question, and the error that
-it may make [m]."""
-
-SUM = 49
-"""Column: the sum over a node or triangle [m]."""
-
-DROP, OPEN, KEEP = -1, 0, 1
-"""Verdicts: nothing of it counts; it must be opened; it can be summed as a whole."""
 
 
 @inlined_kernel
@@ -80,3 +59,10 @@ def _copy_four(rows: Rows, row: np.uint64, column: np.uint64, lanes: Floats, at:
     lanes[p + np.uint64(LANES)] = rows[row, column + np.uint64(1)]
     lanes[p + np.uint64(2 * LANES)] = rows[row, column + np.uint64(2)]
     lanes[p + np.uint64(3 * LANES)] = rows[row, column + np.uint64(3)]
+
+
+@inlined_kernel
+def corner_in_lanes(T: Floats, rounding: float, lanes: Floats, corner: int, i: int) -> Triple:
+    """Return a corner of the triangle in lane i, in the plate's frame."""
+    at = CORNERS + 3 * corner
+    return place_corner(T, rounding, lanes[at * LANES + i], lanes[(at + 1) * LANES + i], lanes[(at + 2) * LANES + i])

@@ -5,17 +5,24 @@ They are kept as a cube (7, 7, 7) of which only a + b + c <= 6 counts. About a p
     int (x + s)^a = sum_i binom(a, i) s^(a - i) int x^i,
 
 one axis after the other; so the moments of two bodies add up to those of both, at a price that knows no triangles.
+All nodes of a tree are gathered so, from the leaves to the root.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import float64, int64
 from numpy.typing import NDArray
 
+from replay.geometry.tree import MAX_DEPTH
 from replay.numerics.gauss import TRIANGLE_16
-from replay.numerics.jit import leaf_kernel
+from replay.numerics.jit import entry, kernel, leaf_kernel
+from replay.sensing.capacitive.tree.registers import AREA, KEPT, MEAN2, MEAN5, MEAN6, ODD5
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 DEGREE = 6
 
@@ -65,3 +72,95 @@ def add_moments(cube: Floats, other: Floats) -> None:
         for j in range(DEGREE + 1 - i):
             for k in range(DEGREE + 1 - i - j):
                 cube[i, j, k] += other[i, j, k]
+
+
+@entry(
+    float64[:, :, ::1],
+    float64[::1],
+    float64[:, ::1],
+    int64[::1],
+    int64[::1],
+    int64[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+)
+@kernel
+def gather_moments(
+    triangles: Floats,
+    areas: Floats,
+    centroids: Floats,
+    second: Ints,
+    begin: Ints,
+    end: Ints,
+    nodes: Floats,
+    moments: Floats,
+) -> None:
+    """Write areas, centroids and moments of all nodes; backwards, so that a node's children come before it."""
+    cubes = np.empty((MAX_DEPTH + 1, DEGREE + 1, DEGREE + 1, DEGREE + 1))
+    waiting = 0
+    for index in range(len(begin) - 1, -1, -1):
+        node = nodes[index]
+        if second[index] < 0:
+            cube = cubes[waiting]
+            cube[:] = 0.0
+            for k in range(begin[index], end[index]):
+                node[AREA] += areas[k]
+            for k in range(begin[index], end[index]):
+                # a body without area still has a place
+                weight = areas[k] / node[AREA] if node[AREA] > 0.0 else 1.0 / (end[index] - begin[index])
+                for axis in range(3):
+                    node[axis] += weight * centroids[k, axis]
+            for k in range(begin[index], end[index]):
+                if areas[k] > 0.0:
+                    add_triangle_moments(triangles[k], areas[k], node, cube)
+            waiting += 1
+        else:
+            # the first child came last
+            first, last = nodes[index + 1], nodes[second[index]]
+            node[AREA] = first[AREA] + last[AREA]
+            share = last[AREA] / node[AREA] if node[AREA] > 0.0 else 0.5
+            for axis in range(3):
+                node[axis] = first[axis] + share * (last[axis] - first[axis])
+            cube, other = cubes[waiting - 2], cubes[waiting - 1]
+            move_moments(cube, last[0] - node[0], last[1] - node[1], last[2] - node[2])
+            move_moments(other, first[0] - node[0], first[1] - node[1], first[2] - node[2])
+            add_moments(cube, other)
+            waiting -= 1
+        if node[AREA] > 0.0:
+            _summarise(cube, node, moments[index])
+
+
+@leaf_kernel
+def _summarise(cube: Floats, node: Floats, moments: Floats) -> None:
+    """Write what of a node's moments is kept, as means over its area."""
+    area = node[AREA]
+    for k in range(len(KEPT)):
+        moments[k] = cube[KEPT[k, 0], KEPT[k, 1], KEPT[k, 2]] / area
+    mean2, mean4, mean6, square5 = 0.0, 0.0, 0.0, 0.0
+    for i in range(4):
+        for j in range(4 - i):
+            k = 3 - i - j
+            # |d|^6 = (x^2 + y^2 + z^2)^3
+            mean6 += _multinomial(i, j, k) * cube[2 * i, 2 * j, 2 * k] / area
+    for i in range(3):
+        for j in range(3 - i):
+            k = 2 - i - j
+            mean4 += _multinomial(i, j, k) * cube[2 * i, 2 * j, 2 * k] / area
+    for i in range(6):
+        for j in range(6 - i):
+            k = 5 - i - j
+            square5 += _multinomial(i, j, k) * (cube[i, j, k] / area) ** 2
+    mean2 = (cube[2, 0, 0] + cube[0, 2, 0] + cube[0, 0, 2]) / area
+    node[MEAN2], node[MEAN6] = mean2, mean6
+    node[MEAN5] = math.sqrt(mean4) * math.sqrt(mean6)  # |d|^5 = |d|^2 |d|^3, by Cauchy and Schwarz
+    node[ODD5] = math.sqrt(square5)
+
+
+@leaf_kernel
+def _multinomial(i: int, j: int, k: int) -> float:
+    result = 1.0
+    for n in range(1, j + 1):
+        result *= (i + n) / n
+    for n in range(1, k + 1):
+        result *= (i + j + n) / n
+    return result
