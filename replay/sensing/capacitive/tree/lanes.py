@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.gather import transpose_four
 from replay.numerics.jit import inlined_kernel
 from replay.sensing.capacitive.placed_plate import Triple, place_corner
 from replay.sensing.capacitive.tree.registers import CORNERS, LANES
@@ -31,34 +32,13 @@ def padded(count: int) -> int:
 def load(rows: Rows, columns: int, which: Ints, count: int, lanes: Floats, at: int) -> None:
     """Write the first columns, in fours, of the rows which[:count] to the lanes, from column `at` on.
 
-    A loop over columns would become scattered stores, which take longer than single ones.
+    `which` is filled up with its last one, to a multiple of four.
     """
-    for i in range(count):
-        # numbers that numba sees to be constants would have it compile `_copy_four` for each
-        row = np.uint64(which[i])
-        _copy_four(rows, row, np.uint64(0), lanes, at, i)
-        if columns > 4:
-            _copy_four(rows, row, np.uint64(4), lanes, at, i)
-        if columns > 8:
-            _copy_four(rows, row, np.uint64(8), lanes, at, i)
-            _copy_four(rows, row, np.uint64(12), lanes, at, i)
-        if columns > 16:
-            _copy_four(rows, row, np.uint64(16), lanes, at, i)
-            _copy_four(rows, row, np.uint64(20), lanes, at, i)
-            _copy_four(rows, row, np.uint64(24), lanes, at, i)
-            _copy_four(rows, row, np.uint64(28), lanes, at, i)
-            _copy_four(rows, row, np.uint64(32), lanes, at, i)
-            _copy_four(rows, row, np.uint64(36), lanes, at, i)
-
-
-@inlined_kernel
-def _copy_four(rows: Rows, row: np.uint64, column: np.uint64, lanes: Floats, at: int, i: int) -> None:
-    # unsigned, as numba looks for indices below 0
-    p = np.uint64(at * LANES + i) + column * np.uint64(LANES)
-    lanes[p] = rows[row, column]
-    lanes[p + np.uint64(LANES)] = rows[row, column + np.uint64(1)]
-    lanes[p + np.uint64(2 * LANES)] = rows[row, column + np.uint64(2)]
-    lanes[p + np.uint64(3 * LANES)] = rows[row, column + np.uint64(3)]
+    for i in range(count, (count + 3) & -4):
+        which[i] = which[count - 1]
+    for first in range(0, count, 4):
+        for column in range(0, columns, 4):
+            transpose_four(rows, which, first, column, lanes, (at + column) * LANES + first, LANES)
 
 
 @inlined_kernel
