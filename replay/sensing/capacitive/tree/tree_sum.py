@@ -25,7 +25,7 @@ from replay.sensing.capacitive.placed_plate import (
 )
 from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.tree.opening import Tally, budget_of, refine
+from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine
 from replay.sensing.capacitive.tree.part_sum import sum_of_parts
 from replay.sensing.capacitive.tree.parts import Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
@@ -91,7 +91,7 @@ def _sum_one(
     if count > 0 and _any_saturates(triangles, room.hard, count, plate, pieces.triangle):
         return math.inf, True, 0.0
     empty(room.queue)
-    budget, tally, lost = budget_of(clusters.nodes, plate, rtol), Tally(0.0, 0.0, 0.0, 0.0), 0.0
+    budget, tally, lost = budget_of(clusters.nodes, plate, rtol), SumTally(0.0, 0.0, 0.0, 0.0), 0.0
     room.stack[0] = 0
     size, judged, alone, touching = 1, 0, 0, False
     while True:
@@ -119,7 +119,7 @@ def _sum_one(
             lost += e
             least += value - error
             spent += error
-        tally = Tally(done, spent, least, doubt)
+        tally = SumTally(done, spent, least, doubt)
     parts, lost_in_parts, whole, in_whole, others = sum_of_parts(clusters, plate, room)
     _add_counts(counts, judged, whole, in_whole, alone + others)
     total, e = two_sum(tally.done, parts)
