@@ -9,6 +9,7 @@ import replay
 from replay.comparison.diff import FRAMES, compare
 from replay.comparison.difference import Fate, Verdict
 from replay.comparison.rules import Rule, Rules, Tolerance
+from replay.recording.events import Events, Transition
 from tests.comparison import made_up
 from tests.comparison.made_up import altered, only_frames, with_names, with_provenance
 
@@ -99,6 +100,39 @@ def test_an_extra_pair_is_named_and_the_others_are_matched_by_name():
     (absence,) = found.extra
     assert (absence.topic, absence.name, len(absence.signals)) == ("/collision", "arm/beam|floor/slab", 4)
     assert found.verdict is Verdict.DIFFERENT
+
+
+def test_other_event_messages_of_equal_columns_are_a_difference():
+    what = Transition("contact", True, PAIR, "/collision")
+    time, frame = BASELINE.time[[40, 60]], np.array([40, 60])
+    events = Events(time, frame, np.array([0, 1]), (what, dataclasses.replace(what, begins=False)))
+    base = dataclasses.replace(BASELINE, events=events)
+    assert compare(base, dataclasses.replace(BASELINE, events=events)).verdict is Verdict.SAME
+    others = {
+        "2 events, 1 of them only here -> 1 event": events[:1],
+        "2 events, 2 of them only here -> 0": Events.none(),
+        "a frame": dataclasses.replace(events, frame=frame + 1),
+        "a time": dataclasses.replace(events, time=time + 1),
+        "a subject": dataclasses.replace(events, transitions=(what, dataclasses.replace(what, subject="x"))),
+        "an order": events[::-1],
+    }
+    for other in others.values():
+        found = compare(base, dataclasses.replace(BASELINE, events=other))
+        assert found.verdict is Verdict.DIFFERENT
+        (change,) = found.scene
+        assert change.name == "/events"
+        only = len([event for event in events if event not in list(other)])
+        assert change.baseline == f"2 events, {only} of them only here"
+        assert change.candidate.startswith(f"{len(other)} events, ")
+        assert (
+            compare(base, dataclasses.replace(BASELINE, events=other), rules=rules("/events", ignore=True)).scene == ()
+        )
+
+    def move(recording):
+        recording.joint_positions[5, 0] += 1.0
+
+    found = compare(base, dataclasses.replace(altered(BASELINE, move), events=Events.none()))
+    assert len(found.signals) == 1 and found.scene == ()  # they follow from what is told
 
 
 def test_a_renamed_sensor_is_recognised_by_its_readings():

@@ -1,6 +1,7 @@
 """Bounding volumes: they contain, they are tight where closed forms say how tight, and bad input is refused."""
 
 import json
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from importlib.util import find_spec
@@ -17,6 +18,7 @@ from replay.geometry.bounds import Obb, fit_aabb, fit_obb, fit_sphere
 from replay.geometry.mesh import load_mesh
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles, eigen
 from replay.numerics import transforms
+from tests.amounts import cases
 
 EPS = np.finfo(float).eps
 PHANTOM = Path(find_spec("pyskindose").submodule_search_locations[0]) / "phantom_data/adult_male.stl"
@@ -198,6 +200,33 @@ def test_smallest_sphere(count: int, seed: int, kind: str) -> None:
         ball = fit_sphere(moved)
         assert (np.linalg.norm(moved - ball.center, axis=1) <= ball.radius).all()
         assert ball.radius == pytest.approx(scale * expected, rel=1e-14, abs=1e-15 * scale + 4 * EPS * far)
+
+
+def test_every_point_is_in_its_sphere_and_box_however_distances_are_rounded() -> None:
+    """What others compute of a point and a volume may be rounded otherwise than by whoever made the volume."""
+    rng = np.random.default_rng(12)
+    for _ in range(cases(300)):
+        points = rng.normal(size=(rng.integers(2, 9), 3)) * 10.0 ** rng.uniform(-3, 3) + rng.normal(size=3)
+        ball, box = fit_sphere(points), fit_aabb(points)
+        x, y, z = (points - ball.center).T
+        ways = (
+            np.sqrt(x * x + y * y + z * z),
+            np.sqrt((z * z + y * y) + x * x),
+            np.array([math.dist(point, ball.center) for point in points]),
+            np.hypot(np.hypot(x, y), z),
+            np.linalg.norm(ball.center - points, axis=1),
+        )
+        for distance in ways:
+            assert (distance <= ball.radius).all()
+        exact = [
+            sum((Fraction(float(a)) - Fraction(float(c))) ** 2 for a, c in zip(point, ball.center, strict=True))
+            for point in points
+        ]
+        assert max(exact) <= Fraction(ball.radius) ** 2
+        assert ball.radius <= math.sqrt(max(exact)) * (1.0 + 16.0 * EPS)
+        for axis in range(3):
+            offsets = [abs(Fraction(float(p)) - Fraction(float(box.center[axis]))) for p in points[:, axis]]
+            assert max(offsets) <= Fraction(float(box.half_widths[axis]))
 
 
 def test_sphere_of_large_sets() -> None:

@@ -130,6 +130,28 @@ def test_a_move_at_exactly_its_limits_is_accepted():
         sample(linkage(joint), script, np.array([0.0]))
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("excess", "accepted"), [(1e-10, True), (1e-8, False), (1e-6, False), (1e-4, False)])
+def test_a_limit_is_exceeded_by_no_more_than_rounding(excess, accepted, sign):
+    beyond = sign * (1.0 + excess)
+    size = 3.0
+    still = Script(points={"hinge": (Waypoint(0.0, size * beyond),)})
+    evenly = Script(points={"hinge": (Waypoint(0.0, 0.0), Waypoint(2.0, 2.0 * size * beyond))})
+    # from rest to rest by a cubic: the acceleration is largest at both ends, 6 d / T^2
+    smooth = Script(points={"hinge": (Waypoint(0.0, 0.0, 0.0), Waypoint(1.0, size * beyond / 6.0, 0.0))})
+    for limits, script in (
+        ({"lower": -size, "upper": size}, still),
+        ({"velocity": size}, evenly),
+        ({"acceleration": size}, smooth),
+    ):
+        joints = linkage(hinge(**limits))
+        if accepted:
+            sample(joints, script, np.array([0.0]))
+        else:
+            with pytest.raises(MotionLimitError, match="joint 'hinge'"):
+                sample(joints, script, np.array([0.0]))
+
+
 @pytest.mark.parametrize(
     ("script", "message"),
     [

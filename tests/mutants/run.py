@@ -1,0 +1,259 @@
+"""Do the tests notice? Faults are planted one by one in a copy of the tree, and the tests about that module are run.
+
+`make mutants` chooses 330 slips of the hand over all rooms (the same ones for the same seed), and plants the faults of
+`planted.yaml`, which somebody found that no test noticed. What is known to change nothing stands with its reason in
+`equivalent.yaml` and is left out. Results are kept in WORK/results.jsonl: a run that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from tests.mutants.mutations import Mutation, has_kernels, is_python, mutations_of
+from tests.mutants.targets import Targets
+from tests.mutants.trial import Outcome, Tree, preload
+
+HERE = Path(__file__).parent
+CHECKOUT = HERE.parents[1]
+WANTED = 0.95  # share of the mutants that tests must notice
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A fault that was found to survive once, and the tests that must notice it."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+    def applied_to(self, source: str) -> str:
+        """Return the source text with the fault; ValueError when it cannot be planted as it is written."""
+        if source.count(self.old) != 1:
+            raise ValueError(f"{self.name}: {self.file} holds its old text {source.count(self.old)} times, not once")
+        return source.replace(self.old, self.new)
+
+
+def planted_faults() -> list[Planted]:
+    """Return the faults of `planted.yaml`."""
+    return [Planted(**{**one, "tests": tuple(one["tests"])}) for one in _yaml("planted.yaml")]
+
+
+def equivalents() -> set[tuple[str, str, str]]:
+    """Return file, text and new text of the mutations that are known to change nothing."""
+    return {(one["file"], one["old"].strip(), one["new"].strip()) for one in _yaml("equivalent.yaml")}
+
+
+def _yaml(name: str) -> list[dict[str, Any]]:
+    loaded = YAML(typ="safe").load((HERE / name).read_text(encoding="utf-8"))
+    return loaded or []
+
+
+def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[list[Mutation], dict[str, int]]:
+    """Return mutations of all rooms, by the root of the number of places a room has, and how many were left out.
+
+    A mutation's turn depends on itself and the seed alone, so that most of a choice stays when code changes.
+    """
+    by_room: dict[str, list[Mutation]] = {}
+    for path in sorted((root / "replay").rglob("*.py")):
+        file = str(path.relative_to(root))
+        for mutation in mutations_of(file, path.read_text(encoding="utf-8")):
+            by_room.setdefault(mutation.room, []).append(mutation)
+    weights = {room: math.sqrt(len(all_of_it)) for room, all_of_it in by_room.items()}
+    known = equivalents()
+    result: list[Mutation] = []
+    left_out: dict[str, int] = {}
+    for room, all_of_it in by_room.items():
+        if rooms and room not in rooms:
+            continue
+        wanted = max(1, round(count * weights[room] / sum(weights.values())))
+        lines: set[tuple[str, int]] = set()
+        for mutation in sorted(all_of_it, key=lambda m: hashlib.sha256(f"{seed} {m.id}".encode()).digest()):
+            if len(lines) == wanted:
+                break
+            if (mutation.file, mutation.line) in lines:
+                continue
+            if (mutation.file, mutation.old.strip(), mutation.new.strip()) in known:
+                left_out[room] = left_out.get(room, 0) + 1
+            elif is_python(mutation.applied_to((root / mutation.file).read_text(encoding="utf-8"))):
+                lines.add((mutation.file, mutation.line))
+                result.append(mutation)
+    return result, left_out
+
+
+class Times:
+    """How long each test file takes without a fault; measured when it is first asked, and kept in a file."""
+
+    def __init__(self, tree: Tree, file: Path) -> None:
+        self._tree = tree
+        self._file = file
+        self.seconds: dict[str, dict[str, float]] = {"compiled": {}, "plain": {}}
+        if file.exists():
+            self.seconds = json.loads(file.read_text())
+
+    def measure(self, tests: Sequence[str], how: str, budget: float) -> None:
+        """Run tests that were not run yet, until enough are known to fill the budget [s].
+
+        One that fails without a fault, or takes longer than the budget, is not asked.
+        """
+        most = 2.0 * budget + 30.0
+        for test in tests:
+            if budget <= 0.0:
+                break
+            if test in self.seconds[how]:
+                budget -= self.of(how).get(test, 0.0)
+                continue
+            outcome = self._tree.run([test], most, compiled=how == "compiled", faultless=True)
+            if outcome.verdict != "passed":
+                _say(f"{test} is not asked ({how} kernels): {outcome.verdict} without a fault\n{outcome.text[-600:]}")
+            self.seconds[how][test] = outcome.seconds if outcome.verdict == "passed" else math.inf
+            budget -= outcome.seconds if outcome.verdict == "passed" else 0.0
+            self._file.write_text(json.dumps(self.seconds, indent=1))
+
+    def of(self, how: str) -> dict[str, float]:
+        """Return the seconds of the tests that can be asked."""
+        return {test: seconds for test, seconds in self.seconds[how].items() if seconds < math.inf}
+
+
+def try_mutation(mutation: Mutation, tree: Tree, targets: Targets, times: Times, budget: float) -> tuple[Outcome, str]:
+    """Return what became of a mutation and how its kernels were run.
+
+    Kernels are tried as plain Python first, by the tests that are quick so, because compiling takes longer than most of
+    them; what survives that meets compiled ones.
+    """
+    text = mutation.applied_to((tree.root / mutation.file).read_text(encoding="utf-8"))
+    ways = ["plain", "compiled"] if has_kernels(tree.root / mutation.file) else ["compiled"]
+    outcome, how = Outcome("passed", 0.0, ""), "compiled"
+    spent = 0.0
+    for how in ways:
+        seconds = times.of(how)
+        tests = targets.of(mutation.file, seconds, budget)
+        if how == "plain":
+            tests = [test for test in tests if seconds[test] <= budget]
+        if not tests:
+            continue
+        limit = 30.0 + 3.0 * sum(seconds[test] for test in tests)
+        if ways[0] == "plain" and how == "compiled":
+            limit += 120.0  # to compile what calls it
+        with tree.with_fault(mutation.file, text):
+            outcome = tree.run(tests, limit, compiled=how == "compiled")
+        spent += outcome.seconds
+        if outcome.verdict != "passed":
+            break
+    return Outcome(outcome.verdict, spent, outcome.text), how
+
+
+def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
+    """Try the chosen mutations, tell the survivors and the figure by room; return whether enough are noticed."""
+    mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
+    targets = Targets(tree.root)
+    times = Times(tree, work / "seconds.json")
+    results = _results(work / "results.jsonl", again=options.again)
+    todo = [mutation for mutation in mutations if mutation.id not in results]
+    _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
+    for number, mutation in enumerate(todo, 1):
+        about_it = targets.of(mutation.file, dict.fromkeys(targets.tests, 0.0), options.budget)
+        times.measure(about_it, "compiled", options.budget)
+        if has_kernels(tree.root / mutation.file):
+            times.measure(about_it, "plain", options.budget)
+        outcome, how = try_mutation(mutation, tree, targets, times, options.budget)
+        by = next((line for line in outcome.text.splitlines() if line.startswith(("FAILED ", "ERROR "))), "")
+        result = {
+            "id": mutation.id,
+            "place": f"{mutation.file}:{mutation.line}",
+            "function": mutation.function,
+            "kernel": mutation.kernel,
+            "kind": mutation.kind,
+            "old": mutation.old.strip(),
+            "new": mutation.new.strip(),
+            "verdict": outcome.verdict,
+            "kernels": how,
+            "by": by.split(" - ")[0],
+            "seconds": round(outcome.seconds, 1),
+        }
+        results[mutation.id] = result
+        with (work / "results.jsonl").open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(result) + "\n")
+        _say(f"{number}/{len(todo)} {result['place']} {outcome.verdict} {result['by']}")
+    return _report([(mutation, results[mutation.id]) for mutation in mutations], left_out)
+
+
+def _results(file: Path, *, again: bool) -> dict[str, dict[str, Any]]:
+    """Return earlier results by id; with `again` only those that tests noticed."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    found = {result["id"]: result for result in map(json.loads, lines)}
+    return {number: result for number, result in found.items() if not again or result["verdict"] != "passed"}
+
+
+def _report(tried: list[tuple[Mutation, dict[str, Any]]], left_out: dict[str, int]) -> bool:
+    for _, result in tried:
+        if result["verdict"] == "passed":
+            _say(f"\nsurvived: {result['place']} in {result['function'] or 'the module'} ({result['kind']})")
+            _say(f"  - {result['old']}\n  + {result['new']}")
+    rows = sorted({mutation.room for mutation, _ in tried})
+    print(f"{'room':14}{'mutants':>9}{'noticed':>9}{'share':>8}{'equivalent, left out':>22}")
+    for name in [*rows, "(kernels)", "all"]:
+        of_it = [
+            result["verdict"] != "passed"
+            for mutation, result in tried
+            if name in (mutation.room, "all") or (name == "(kernels)" and mutation.kernel)
+        ]
+        if of_it:
+            less = sum(left_out.values()) if name == "all" else left_out.get(name, 0)
+            print(f"{name:14}{len(of_it):9}{sum(of_it):9}{sum(of_it) / len(of_it):8.1%}{less:22}")
+    return sum(result["verdict"] != "passed" for _, result in tried) >= WANTED * len(tried)
+
+
+def run_planted(tree: Tree, names: Sequence[str]) -> bool:
+    """Plant each fault of `planted.yaml`; return whether each is noticed by a test that is named for it."""
+    good = True
+    for fault in planted_faults():
+        if names and fault.name not in names:
+            continue
+        text = fault.applied_to((tree.root / fault.file).read_text(encoding="utf-8"))
+        with tree.with_fault(fault.file, text):
+            outcome = tree.run(fault.tests, 300.0, compiled=True)
+        noticed = outcome.verdict != "passed"
+        by = next((line for line in outcome.text.splitlines() if line.startswith(("FAILED ", "ERROR "))), "")
+        print(f"{'noticed' if noticed else 'SURVIVED'}  {fault.name}  {by.split(' - ')[0]}", flush=True)
+        good = good and noticed
+    return good
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def main() -> int:
+    """Run what the command line asks for; 0 when the tests notice enough."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=330, help="mutants over all rooms")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--room", action="append", default=[], help="only this room's share; may be repeated")
+    parser.add_argument("--budget", type=float, default=40.0, help="seconds of tests that are asked about one mutant")
+    parser.add_argument("--again", action="store_true", help="try survivors of an earlier run again")
+    parser.add_argument("--planted", nargs="*", metavar="NAME", help="the faults of planted.yaml instead, or some")
+    parser.add_argument("--work", type=Path, default=CHECKOUT / "recordings" / "mutants")
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    preload()
+    tree = Tree(CHECKOUT, options.work.resolve())
+    good = (
+        run_planted(tree, options.planted) if options.planted is not None else run_mutants(tree, options.work, options)
+    )
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
