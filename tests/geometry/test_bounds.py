@@ -152,7 +152,7 @@ def test_covariance_is_that_of_the_sheet() -> None:
     np.testing.assert_allclose(covariance_of_points(points), np.cov(points.T, bias=True), rtol=1e-13)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 @given(st.lists(st.floats(-6, 6), min_size=3, max_size=3), st.integers(0, 2**32), st.booleans())
 def test_eigen(exponents: list[float], seed: int, repeated: bool) -> None:
     values = np.sort(10.0 ** np.array(exponents))
@@ -181,7 +181,7 @@ def brute_force_radius(points: np.ndarray) -> float:
     return float(best)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=cases(60), deadline=None)
 @given(st.integers(1, 9), st.integers(0, 2**32), st.sampled_from(["cloud", "grid", "plane", "line", "shell"]))
 def test_smallest_sphere(count: int, seed: int, kind: str) -> None:
     rng = np.random.default_rng(seed)
@@ -243,7 +243,7 @@ def test_sphere_of_large_sets() -> None:
     assert ball.radius == pytest.approx(brute_force_radius(touching[:6]), rel=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=cases(100), deadline=None)
 @given(st.integers(1, 50), st.integers(0, 2**32), st.floats(-6, 6), st.floats(0, 1e6))
 def test_aabb(count: int, seed: int, exponent: float, far: float) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * 10.0**exponent + far
@@ -254,7 +254,7 @@ def test_aabb(count: int, seed: int, exponent: float, far: float) -> None:
     np.testing.assert_allclose(2 * box.half_widths, np.ptp(points, axis=0), rtol=1e-14, atol=4 * EPS * far)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=cases(60), deadline=None)
 @given(
     st.integers(1, 40),
     st.integers(0, 2**32),
@@ -319,8 +319,8 @@ def test_obb_is_never_larger(method: str) -> None:
         [(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)],
     ]
     sets = [np.array([(x, y, z) for x, y in prism for z in (0, 1)], dtype=float) for prism in prisms]
-    sets += [rng.normal(size=(rng.integers(4, 12), 3)) for _ in range(400)]
-    sets += [rng.normal(size=(9, 3)) * 10.0 ** rng.uniform(-4, 4, 3) for _ in range(100)]
+    sets += [rng.normal(size=(rng.integers(4, 12), 3)) for _ in range(cases(400))]
+    sets += [rng.normal(size=(9, 3)) * 10.0 ** rng.uniform(-4, 4, 3) for _ in range(cases(100))]
     for points in sets:
         box, along = fit_obb(points, method=method), fit_aabb(points)
         rounding = 1e-14 * np.max(np.abs(along.half_widths))

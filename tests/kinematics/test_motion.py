@@ -12,6 +12,7 @@ from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.kinematics.motion import Keyframe, Move, Script, Track, Waypoint, plan, sample
 from replay.kinematics.profiles import from_pieces, through_waypoints, trapezoid, trapezoid_time
 from replay.numerics import transforms
+from tests.amounts import cases
 
 
 def linkage(*joints: Joint) -> Linkage:
@@ -53,7 +54,7 @@ def test_positions_hold_before_the_first_and_after_the_last_waypoint():
     acceleration=st.floats(1e-3, 1e2),
     sign=st.sampled_from([-1.0, 1.0]),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 def test_trapezoid_arrives_at_rest_within_its_limits(distance, velocity, acceleration, sign):
     target = 0.25 + sign * distance
     profile = from_pieces(trapezoid(2.0, 0.25, target, velocity, acceleration), 0.25, target)
