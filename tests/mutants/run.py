@@ -217,10 +217,14 @@ def _report(tried: list[tuple[Mutation, dict[str, Any]]], left_out: dict[str, in
 
 def run_planted(tree: Tree, names: Sequence[str]) -> bool:
     """Plant each fault of `planted.yaml`; return whether each is noticed by a test that is named for it."""
+    faults = [fault for fault in planted_faults() if not names or fault.name in names]
+    tests = dict.fromkeys(test for fault in faults for test in fault.tests)
+    outcome = tree.run(list(tests), 3000.0, compiled=True, faultless=True)
+    if outcome.verdict != "passed":
+        _say(f"the tests fail without a fault:\n{outcome.text}")
+        return False
     good = True
-    for fault in planted_faults():
-        if names and fault.name not in names:
-            continue
+    for fault in faults:
         text = fault.applied_to((tree.root / fault.file).read_text(encoding="utf-8"))
         with tree.with_fault(fault.file, text):
             outcome = tree.run(fault.tests, 300.0, compiled=True)

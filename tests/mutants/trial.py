@@ -24,10 +24,26 @@ import psutil
 LEFT_OUT = shutil.ignore_patterns(
     ".git", ".venv", "__pycache__", "*.egg-info", ".*_cache", ".hypothesis", "recordings", "regress", "build", "dist"
 )
-PRELOADED = ("pytest", "numpy", "numba", "scipy.spatial", "pydantic", "trimesh", "pyarrow", "mcap.writer")
+PRELOADED = (
+    *("pytest", "hypothesis", "numpy", "numba", "scipy.spatial", "scipy.optimize", "pydantic", "trimesh", "pyarrow"),
+    *(
+        "mcap.writer",
+        "rerun",
+        "matplotlib.figure",
+        "ruamel.yaml",
+        "jinja2",
+        "click",
+        "rich",
+        "mpmath",
+        "fcl",
+        "xmlschema",
+    ),
+)
 """Packages that a trial finds imported; `replay` and `tests` are each trial's own."""
 MOST_MEMORY = 3 << 30
 """Bytes of a trial and its children; beyond, it is ended."""
+_OPTIONS = ("-x", "-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
+_OPTIONS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is preloaded
 _NO_TEST = 5  # pytest's exit code
 _PAUSE = 0.05  # seconds between two looks
 _CLOCK = 10.0  # what a limit of processor time is by the clock: the machine may be busy, and tests wait for processes
@@ -129,7 +145,7 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
         sys.path[:] = [str(root), *(place for place in sys.path if Path(place).resolve() not in (Path.cwd(), root))]
         importlib.invalidate_caches()
         pytest = importlib.import_module("pytest")
-        code = int(pytest.main(["-x", "-q", "--no-header", "--tb=line", "-p", "no:cacheprovider", *tests]))
+        code = int(pytest.main([*_OPTIONS, *tests]))
     except BaseException as error:  # whatever a fault does
         print(f"{type(error).__name__}: {error}", flush=True)
     finally:
