@@ -148,6 +148,26 @@ def test_a_renamed_sensor_is_recognised_by_its_readings():
     assert found.verdict is Verdict.DIFFERENT
 
 
+def test_a_renamed_sensor_is_recognised_where_one_more_shape_renumbers_the_others():
+    def tell_apart(recording):
+        recording.distance.distance[:, 0] += 0.25
+
+    def renumber(recording):
+        seen = recording.distance.shape >= 0
+        recording.distance.shape[seen] += 1
+
+    def another_shape(recording):
+        recording.distance.shape[20, 0] = 0
+
+    baseline = altered(BASELINE, tell_apart)
+    shapes = ("arm/a_new_one", *made_up.LAYOUT.shapes)
+    candidate = with_names(altered(baseline, renumber), shapes=shapes, distance_sensors=("links", "right"))
+    found = compare(baseline, candidate)
+    assert [item.same_as for item in found.missing] == [("/distance/links", "")]
+    other = compare(baseline, altered(candidate, another_shape))
+    assert [item.same_as for item in other.missing] == [None]
+
+
 def test_a_renamed_pair_is_recognised_and_equal_readings_of_several_are_not_guessed():
     found = compare(BASELINE, with_names(BASELINE, pairs=(PAIR, "arm/beam|stand/post")))
     assert [item.same_as for item in found.missing] == [("/collision", "arm/beam|stand/post")]

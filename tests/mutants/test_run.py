@@ -30,6 +30,7 @@ def inside(x: float, half: float = 1.0) -> bool:
 class Box:
     def grow(self, flag):
         self.size = max(self.size, 2)
+        self.rows.reshape(-1, flag)
         if flag:
             raise ValueError(f"{flag + 1}")
 '''
@@ -62,6 +63,7 @@ def test_every_kind_of_slip_is_found_where_it_can_be_noticed_and_nowhere_else():
         ("Box.grow", "self.size = max(self.size, 2)", "self.size = min(self.size, 2)"),
         ("Box.grow", "self.size = max(self.size, 2)", "self.size = max(self.size, 3)"),
         ("Box.grow", "self.size = max(self.size, 2)", "pass"),
+        ("Box.grow", "self.rows.reshape(-1, flag)", "pass"),
         ("Box.grow", "if flag:", "if not (flag):"),
         ("Box.grow", 'raise ValueError(f"{flag + 1}")', "pass"),
     }
