@@ -25,6 +25,7 @@ from tests.mutants.trial import Outcome, Tree, preload
 
 HERE = Path(__file__).parent
 CHECKOUT = HERE.parents[1]
+GUESS = 5.0  # seconds that a test file takes of which nothing is known yet
 WANTED = 0.95  # share of the mutants that tests must notice
 
 
@@ -92,41 +93,52 @@ def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[lis
     return result, left_out
 
 
-class Times:
-    """How long each test file takes without a fault; measured when it is first asked, and kept in a file."""
+class Experience:
+    """What earlier trials have told of the tests, kept in a file: how long each file takes, and which tests are sound.
 
-    def __init__(self, tree: Tree, file: Path) -> None:
+    A test is sound when it passes without a fault: only then does its failing say anything.
+    """
+
+    def __init__(self, tree: Tree, targets: Targets, file: Path) -> None:
         self._tree = tree
         self._file = file
-        self.seconds: dict[str, dict[str, float]] = {"compiled": {}, "plain": {}}
-        if file.exists():
-            self.seconds = json.loads(file.read_text())
+        self._tests = targets.tests
+        known = json.loads(file.read_text()) if file.exists() else {}
+        self._seconds: dict[str, dict[str, float]] = known.get("seconds", {"compiled": {}, "plain": {}})
+        self._sound: dict[str, bool] = known.get("sound", {})
 
-    def measure(self, tests: Sequence[str], how: str, budget: float) -> None:
-        """Run tests that were not run yet, until enough are known to fill the budget [s].
+    def seconds(self, how: str) -> dict[str, float]:
+        """Return the seconds of the test files that can be asked, with compiled or with plain kernels."""
+        known = self._seconds[how]
+        return {test: known.get(test, GUESS) for test in self._tests if known.get(test, GUESS) < math.inf}
 
-        One that fails without a fault, or takes longer than the budget, is not asked.
-        """
-        most = 2.0 * budget + 30.0
-        for test in tests:
-            if budget <= 0.0:
-                break
-            if test in self.seconds[how]:
-                budget -= self.of(how).get(test, 0.0)
-                continue
-            outcome = self._tree.run([test], most, compiled=how == "compiled", faultless=True)
-            if outcome.verdict != "passed":
-                _say(f"{test} is not asked ({how} kernels): {outcome.verdict} without a fault\n{outcome.text[-600:]}")
-            self.seconds[how][test] = outcome.seconds if outcome.verdict == "passed" else math.inf
-            budget -= outcome.seconds if outcome.verdict == "passed" else 0.0
-            self._file.write_text(json.dumps(self.seconds, indent=1))
+    def learn(self, outcome: Outcome, how: str) -> None:
+        """Take the times of a trial that passed."""
+        self._seconds[how].update(outcome.by_file)
+        self._keep()
 
-    def of(self, how: str) -> dict[str, float]:
-        """Return the seconds of the tests that can be asked."""
-        return {test: seconds for test, seconds in self.seconds[how].items() if seconds < math.inf}
+    def is_sound(self, tests: Sequence[str], limit: float, how: str) -> bool:
+        """Return whether tests pass without a fault within a limit; a file of those that do not is not asked again."""
+        key = f"{how} {limit:.0f} {' '.join(tests)}" if len(tests) > 1 else f"{how} {tests[0]}"
+        if key not in self._sound:
+            outcome = self._tree.run(tests, limit, compiled=how == "compiled", faultless=True)
+            self._sound[key] = outcome.verdict == "passed"
+            if outcome.verdict == "passed" and len(tests) > 1:
+                self.learn(outcome, how)
+            elif outcome.verdict != "passed":
+                _say(f"not asked ({how} kernels), {outcome.verdict} without a fault: {outcome.failed_test or tests}")
+                worst = (outcome.failed_test or max(tests, key=self.seconds(how).__getitem__)).partition("::")[0]
+                self._seconds[how][worst] = math.inf
+            self._keep()
+        return self._sound[key]
+
+    def _keep(self) -> None:
+        self._file.write_text(json.dumps({"seconds": self._seconds, "sound": self._sound}, indent=1))
 
 
-def try_mutation(mutation: Mutation, tree: Tree, targets: Targets, times: Times, budget: float) -> tuple[Outcome, str]:
+def try_mutation(
+    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, budget: float
+) -> tuple[Outcome, str]:
     """Return what became of a mutation and how its kernels were run.
 
     Kernels are tried as plain Python first, by the tests that are quick so, because compiling takes longer than most of
@@ -134,41 +146,40 @@ def try_mutation(mutation: Mutation, tree: Tree, targets: Targets, times: Times,
     """
     text = mutation.applied_to((tree.root / mutation.file).read_text(encoding="utf-8"))
     ways = ["plain", "compiled"] if has_kernels(tree.root / mutation.file) else ["compiled"]
-    outcome, how = Outcome("passed", 0.0, ""), "compiled"
     spent = 0.0
     for how in ways:
-        seconds = times.of(how)
-        tests = targets.of(mutation.file, seconds, budget)
-        if how == "plain":
-            tests = [test for test in tests if seconds[test] <= budget]
-        if not tests:
-            continue
-        limit = 30.0 + 3.0 * sum(seconds[test] for test in tests)
-        if ways[0] == "plain" and how == "compiled":
-            limit += 120.0  # to compile what calls it
-        with tree.with_fault(mutation.file, text):
-            outcome = tree.run(tests, limit, compiled=how == "compiled")
-        spent += outcome.seconds
-        if outcome.verdict != "passed":
-            break
-    return Outcome(outcome.verdict, spent, outcome.text), how
+        while True:
+            seconds = experience.seconds(how)
+            tests = targets.of(mutation.file, seconds, budget)
+            if how == "plain":
+                tests = [test for test in tests if seconds[test] <= budget]
+            if not tests:
+                outcome = Outcome("passed", 0.0, {}, "no test is about it")
+                break
+            limit = 30.0 + 3.0 * sum(seconds[test] for test in tests)
+            limit += 120.0 if ways == ["plain", "compiled"] and how == "compiled" else 0.0  # to compile what calls it
+            with tree.with_fault(mutation.file, text):
+                outcome = tree.run(tests, limit, compiled=how == "compiled")
+            spent += outcome.seconds
+            if outcome.verdict == "passed":
+                experience.learn(outcome, how)
+                break
+            suspects = [outcome.failed_test] if "::" in outcome.failed_test else tests
+            if experience.is_sound(suspects, limit, how):
+                return Outcome(outcome.verdict, spent, {}, outcome.text), how
+    return Outcome(outcome.verdict, spent, {}, outcome.text), how
 
 
 def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     """Try the chosen mutations, tell the survivors and the figure by room; return whether enough are noticed."""
     mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
     targets = Targets(tree.root)
-    times = Times(tree, work / "seconds.json")
+    experience = Experience(tree, targets, work / "experience.json")
     results = _results(work / "results.jsonl", again=options.again)
     todo = [mutation for mutation in mutations if mutation.id not in results]
     _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
     for number, mutation in enumerate(todo, 1):
-        about_it = targets.of(mutation.file, dict.fromkeys(targets.tests, 0.0), options.budget)
-        times.measure(about_it, "compiled", options.budget)
-        if has_kernels(tree.root / mutation.file):
-            times.measure(about_it, "plain", options.budget)
-        outcome, how = try_mutation(mutation, tree, targets, times, options.budget)
-        by = next((line for line in outcome.text.splitlines() if line.startswith(("FAILED ", "ERROR "))), "")
+        outcome, how = try_mutation(mutation, tree, targets, experience, options.budget)
         result = {
             "id": mutation.id,
             "place": f"{mutation.file}:{mutation.line}",
@@ -179,7 +190,7 @@ def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
             "new": mutation.new.strip(),
             "verdict": outcome.verdict,
             "kernels": how,
-            "by": by.split(" - ")[0],
+            "by": outcome.failed_test,
             "seconds": round(outcome.seconds, 1),
         }
         results[mutation.id] = result
@@ -229,8 +240,7 @@ def run_planted(tree: Tree, names: Sequence[str]) -> bool:
         with tree.with_fault(fault.file, text):
             outcome = tree.run(fault.tests, 300.0, compiled=True)
         noticed = outcome.verdict != "passed"
-        by = next((line for line in outcome.text.splitlines() if line.startswith(("FAILED ", "ERROR "))), "")
-        print(f"{'noticed' if noticed else 'SURVIVED'}  {fault.name}  {by.split(' - ')[0]}", flush=True)
+        print(f"{'noticed' if noticed else 'SURVIVED'}  {fault.name}  {outcome.failed_test}", flush=True)
         good = good and noticed
     return good
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import json
 import math
 import os
 import resource
@@ -44,6 +45,7 @@ MOST_MEMORY = 3 << 30
 """Bytes of a trial and its children; beyond, it is ended."""
 _OPTIONS = ("-x", "-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
 _OPTIONS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is preloaded
+_BY_FILE = "seconds.json"
 _NO_TEST = 5  # pytest's exit code
 _PAUSE = 0.05  # seconds between two looks
 _CLOCK = 10.0  # what a limit of processor time is by the clock: the machine may be busy, and tests wait for processes
@@ -56,12 +58,21 @@ class Outcome:
     Attributes:
         verdict: "passed", "failed", "too long" or "too large".
         seconds: processor time of the process and of those that it waited for.
+        by_file: processor time of each test file; nothing of a trial that did not pass.
         text: the end of what it printed.
     """
 
     verdict: str
     seconds: float
+    by_file: dict[str, float]
     text: str
+
+    @property
+    def failed_test(self) -> str:
+        """The test that failed first; "" when none says so."""
+        heads = ("FAILED ", "ERROR ")
+        lines = (line for line in self.text.splitlines() if line.startswith(heads))
+        return next((line.split(" ", 1)[1].split(" - ")[0] for line in lines), "")
 
 
 class Tree:
@@ -117,7 +128,9 @@ class Tree:
             _be_pytest(self.root, tests, output, cache, self._temporary, compiled=compiled)
         verdict, seconds = _watch(child, time.monotonic() + _CLOCK * limit)
         text = output.read_text(errors="replace")[-3000:] if output.exists() else ""
-        return Outcome(verdict, seconds, text)
+        file = self._temporary / _BY_FILE
+        by_file = json.loads(file.read_text()) if verdict == "passed" and file.exists() else {}
+        return Outcome(verdict, seconds, by_file, text)
 
 
 def preload() -> None:
@@ -145,11 +158,30 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
         sys.path[:] = [str(root), *(place for place in sys.path if Path(place).resolve() not in (Path.cwd(), root))]
         importlib.invalidate_caches()
         pytest = importlib.import_module("pytest")
-        code = int(pytest.main([*_OPTIONS, *tests]))
+        code = int(pytest.main([*_OPTIONS, *tests], plugins=[_Watch(temporary / _BY_FILE)]))
     except BaseException as error:  # whatever a fault does
         print(f"{type(error).__name__}: {error}", flush=True)
     finally:
         os._exit(code)
+
+
+class _Watch:
+    """A plugin of pytest that notes how long the tests of each file take."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._seconds: dict[str, float] = {}
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """Note the time since the last test; `nodeid` begins with the file."""
+        file = nodeid.partition("::")[0]
+        now = time.process_time()
+        self._seconds[file] = self._seconds.get(file, 0.0) + now - getattr(self, "_before", 0.0)
+        self._before = now
+
+    def pytest_sessionfinish(self) -> None:
+        """Write what was noted."""
+        self._file.write_text(json.dumps(self._seconds))
 
 
 def _watch(child: int, deadline: float) -> tuple[str, float]:

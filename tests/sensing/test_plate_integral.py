@@ -11,6 +11,7 @@ import pytest
 
 from replay.errors import InvalidValue
 from replay.sensing.capacitive import plate_integral
+from replay.sensing.capacitive.contact import CLEAR, SATURATED, TOUCHING, contact
 from tests.amounts import cases
 from tests.sensing import plate_cases, plate_reference
 
@@ -160,7 +161,9 @@ def test_a_triangle_around_the_plate_saturates_it_in_either_winding(order):
             triangle = np.array(corners, dtype=float)[list(order)] * [*half, 1.0]
             assert plate_integral([triangle], half, side="both")[0] == math.inf
             assert plate_integral([triangle], half, side="front")[0] == 0.0
+            assert [contact(triangle, *half, both) for both in (True, False)] == [SATURATED, TOUCHING]
             beside = triangle + np.array([20.0 * half[0], 0.0, 0.0])
+            assert [contact(beside, *half, both) for both in (True, False)] == [CLEAR, CLEAR]
             assert 0.0 < plate_integral([beside], half, side="both")[0] < math.inf
 
 
