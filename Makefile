@@ -5,24 +5,27 @@ BIN := $(VENV)/bin
 RECORDINGS := recordings
 BASELINES := tests/baselines
 NIGHT := regress
+# uv needs 4 s for what takes pip half a minute; pip takes over, and uv has said why, where only pip knows the way to an index.
 # Python compiles the modules that are imported, when they are: of thousands in a fresh environment few ever are
-INSTALL := -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1) || $(call pip,$(1))
+pip = $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt $(1)
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run regress accept test lint format type schemas bench pictures soak clean system
+.PHONY: help setup run regress accept freeze test lint format type schemas bench pictures soak plain mutants clean system
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## */\1\t/' | awk -F'\t' '{printf "  make %-10s %s\n", $$1, $$2}'
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python $(INSTALL) -e .
-	$(BIN)/python $(INSTALL) --no-deps $(PHANTOMS)
+	$(call pip,uv)
+	$(call install,-e .)
+	$(call install,--no-deps $(PHANTOMS))
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
-	$(BIN)/python $(INSTALL) -e '.[test]'
+	$(call install,-e '.[test]')
 	@touch $@
 
 setup: $(VENV)/.run  ## create .venv and install the package and the phantoms
@@ -40,6 +43,9 @@ regress: setup  ## run every scenario and compare it with its accepted recording
 
 accept: setup  ## make the results of `make regress` the accepted ones: make accept REASON='why'
 	$(BIN)/replay accept $(NIGHT) --baseline $(BASELINES) --reason "$(REASON)"
+
+freeze: $(VENV)/.test  ## freeze the readings of methods whose revision was raised
+	$(BIN)/python -m tests.frozen
 
 test: $(VENV)/.test system lint type  ## install what is missing, then lint, types and all tests
 	$(BIN)/python -m pytest -n 2 --dist loadfile
@@ -60,7 +66,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.comparison.rules_file
 
 bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
-	$(BIN)/python $(INSTALL) -e '.[bench]'
+	$(call install,-e '.[bench]')
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 
@@ -75,6 +81,13 @@ pictures: $(VENV)/.test system  ## make the README's pictures, two of them from 
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
+
+plain: $(VENV)/.test  ## every test with kernels as plain Python, as in a debugger; those that take long so with fewer cases
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n 2 --dist loadfile
+
+mutants: $(VENV)/.test  ## do the tests notice? planted faults, and 330 mutants over all rooms (hours); goes on where it stopped
+	$(BIN)/python -m tests.mutants.run --planted
+	$(BIN)/python -m tests.mutants.run
 
 system:  # a software Vulkan driver for the viewer; for tests a browser, certificates, and what a process asks the system
 	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && \

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from replay.comparison.difference import Absence
 from replay.comparison.rules import Rules
 from replay.comparison.signals import Group, Signal
+from replay.numerics.arrays import Integers
 
 Key = tuple[str, str]
 Groups = Mapping[Key, Group]
@@ -45,7 +46,7 @@ def with_new_names(
     extra: tuple[Absence, ...],
     groups_a: Groups,
     groups_b: Groups,
-    rows: tuple[NDArray[np.int64] | None, NDArray[np.int64] | None],
+    rows: tuple[Integers | None, Integers | None],
 ) -> tuple[tuple[Absence, ...], tuple[Absence, ...]]:
     """Say of what is missing under which other name it is there, where exactly one extra has the same readings.
 
@@ -73,9 +74,7 @@ def _same_as(item: Absence, other: Absence | None) -> Absence:
     return item if other is None else dataclasses.replace(item, same_as=(other.topic, other.name))
 
 
-def _fingerprints(
-    items: Iterable[Absence], groups: Groups, rows: NDArray[np.int64] | None
-) -> list[tuple[tuple[str, ...], str]]:
+def _fingerprints(items: Iterable[Absence], groups: Groups, rows: Integers | None) -> list[tuple[tuple[str, ...], str]]:
     """Return of each item its fields and a digest of its values, without the name that may have changed."""
     places = {signal: (group, k) for group in groups.values() for k, signal in enumerate(group.signals)}
     prints = []
@@ -86,9 +85,15 @@ def _fingerprints(
             group, column = places[signal]
             values = group.values[:, column] if rows is None else group.values[rows, column]
             if group.categories:
-                values = np.array(group.categories)[values + 1]
+                values = _numbers_of(group.categories)[values + 1]
             digest.update(np.ascontiguousarray(values).tobytes())
             named = signal.name if item.whole_topic else ""
             fields.append(f"{signal.topic.split('/')[1]}/{signal.field}/{named}")
         prints.append((tuple(fields), digest.hexdigest()))
     return prints
+
+
+def _numbers_of(texts: Sequence[str]) -> NDArray[np.uint64]:
+    """Return a number for each text that both runs give it, whatever texts stand beside it in each."""
+    digests = [hashlib.sha256(text.encode()).digest() for text in texts]
+    return np.array([int.from_bytes(digest[:8], "little") for digest in digests], dtype=np.uint64)

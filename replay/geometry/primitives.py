@@ -11,19 +11,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
+from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import FULL_TURN
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 FEWEST_SEGMENTS = 8
 """Segments of a full circle, however coarse the chord error asked for."""
 
 _MOST_TRIANGLES = 2_000_000
-_FULL_TURN = 2.0 * math.pi
 
 
 def cuboid(size: Sequence[float]) -> Solid:
@@ -105,7 +103,7 @@ def capsule(radius: float, height: float, chord_error: float) -> Solid:
     """
     _positive("radius", radius)
     _positive("height", height)
-    count = _segments(radius, _FULL_TURN, chord_error)
+    count = _segments(radius, FULL_TURN, chord_error)
     _check_count("chord_error", chord_error, 2.0 * count * count)  # a facet is twice as deep as a chord
     while radius * _deepest(cap := _half_sphere(count)) > chord_error:
         count += 1
@@ -154,9 +152,9 @@ def arc(radius: float, span: float, width: float, thickness: float, chord_error:
         _positive(name, value)
     if thickness >= 2.0 * radius:
         raise InvalidValue("thickness", thickness, f"must be below twice the radius, {2.0 * radius} m")
-    if span > _FULL_TURN * (1.0 + 1e-12):
+    if span > FULL_TURN * (1.0 + 1e-12):
         raise InvalidValue("span", span, "must be at most 2 pi rad")
-    full = span >= _FULL_TURN * (1.0 - 1e-12)
+    full = span >= FULL_TURN * (1.0 - 1e-12)
     outer = radius + 0.5 * thickness
     inner = radius - 0.5 * thickness
     count = _segments(outer, span, chord_error)
@@ -190,31 +188,31 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
     """Return the fewest equal segments of an arc whose sagitta is at most chord_error."""
     _positive("chord_error", chord_error)
     half_angle = 2.0 * math.asin(math.sqrt(min(0.5 * chord_error / radius, 0.5)))
-    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / _FULL_TURN - 1e-9))
+    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / FULL_TURN - 1e-9))
     needed = 0.5 * span / half_angle
     _check_count("chord_error", chord_error, 8.0 * needed)
     count = max(fewest, math.ceil(needed))
     return count if _sagitta(radius, 0.5 * span / count) <= chord_error else count + 1
 
 
-def _circle(radius: float, chord_error: float) -> tuple[Array, float]:
+def _circle(radius: float, chord_error: float) -> tuple[Floats, float]:
     """Return the corners (n, 2) of the polygon, counter-clockwise, and its sagitta."""
     _positive("radius", radius)
-    return _polygon(radius, _segments(radius, _FULL_TURN, chord_error))
+    return _polygon(radius, _segments(radius, FULL_TURN, chord_error))
 
 
-def _polygon(radius: float, count: int) -> tuple[Array, float]:
+def _polygon(radius: float, count: int) -> tuple[Floats, float]:
     """Return the corners (count, 2) of a regular polygon, counter-clockwise, and its sagitta."""
-    angles = [_FULL_TURN * k / count for k in range(count)]
+    angles = [FULL_TURN * k / count for k in range(count)]
     rim = np.array([[radius * math.cos(angle), radius * math.sin(angle)] for angle in angles])
     return rim, _sagitta(radius, math.pi / count)
 
 
-def _half_sphere(count: int) -> Array:
+def _half_sphere(count: int) -> Floats:
     """Return the upper half (n, 3, 3) of the unit sphere: rings of `count` corners, a quarter as many from the pole."""
     rings = -(-count // 4)
     rim, _ = _polygon(1.0, count)
-    angles = [0.25 * _FULL_TURN * k / rings for k in range(1, rings)]  # from the pole
+    angles = [0.25 * FULL_TURN * k / rings for k in range(1, rings)]  # from the pole
     heights = [*((math.sin(angle), math.cos(angle)) for angle in angles), (1.0, 0.0)]
     circles = [np.column_stack([wide * rim, np.full(count, high)]) for wide, high in heights]
     pole = np.zeros((count, 3))
@@ -227,7 +225,7 @@ def _half_sphere(count: int) -> Array:
     return np.concatenate([fan, *bands])
 
 
-def _icosahedron() -> Array:
+def _icosahedron() -> Floats:
     """Return the 20 faces (20, 3, 3) of the icosahedron with corners on the unit sphere, seen from outside."""
     golden = 0.5 * (1.0 + math.sqrt(5.0))
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
@@ -247,18 +245,18 @@ def _icosahedron() -> Array:
 _ICOSAHEDRON = _icosahedron()
 
 
-def _sphere_face(face: Array, splits: int) -> Array:
+def _sphere_face(face: Floats, splits: int) -> Floats:
     """Return one face of the icosahedron as splits^2 triangles (n, 3, 3) with corners on the unit sphere.
 
     A point is i A + j B + k C, i + j + k = splits, pushed out. On an edge one term is zero, so both faces round alike
     and the seams close exactly.
     """
 
-    def corner(i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    def corner(i: Integers, j: Integers) -> Floats:
         k = splits - i - j
         raw = i[:, None] * face[0] + j[:, None] * face[1] + k[:, None] * face[2]
-        length: Array = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
-        pushed: Array = raw / length[:, None]
+        length: Floats = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
+        pushed: Floats = raw / length[:, None]
         return pushed
 
     i, j = (index.ravel() for index in np.meshgrid(np.arange(splits), np.arange(splits), indexing="ij"))
@@ -269,11 +267,11 @@ def _sphere_face(face: Array, splits: int) -> Array:
     return np.concatenate([upward, downward])
 
 
-def _unit_sphere(splits: int) -> Array:
+def _unit_sphere(splits: int) -> Floats:
     return np.concatenate([_sphere_face(face, splits) for face in _ICOSAHEDRON])
 
 
-def _deepest(triangles: Array, scale: Array | None = None) -> float:
+def _deepest(triangles: Floats, scale: Floats | None = None) -> float:
     """Return the largest depth of triangles inscribed in the unit sphere below it, or once both are stretched."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
@@ -283,12 +281,12 @@ def _deepest(triangles: Array, scale: Array | None = None) -> float:
     return float(np.max(depth))
 
 
-def _quads(corners: Array) -> Array:
+def _quads(corners: Floats) -> Floats:
     """Return quadrilaterals (n, 4, 3) as triangles (2 n, 3, 3)."""
     return np.ascontiguousarray(corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3))
 
 
-def _distinct(triangles: Array) -> Array:
+def _distinct(triangles: Floats) -> Floats:
     return distinct_rows(triangles.reshape(-1, 3) + 0.0).rows
 
 

@@ -15,7 +15,7 @@ from replay import limits
 from replay.collision.columns import Level
 from replay.errors import RobotError, ScenarioError
 from replay.kinematics.linkage import Linkage
-from replay.language.units import FULL_TURN
+from replay.numerics.constants import FULL_TURN
 from replay.robots.part import Part
 from replay.scenario.load import load_from
 from replay.scenario.model import Scenario

@@ -35,7 +35,7 @@ class JointPart(Part):
     """Unique among all joints; the link's name when left out."""
 
 
-class Mimic(Part):
+class MimicPart(Part):
     """The joint that another one follows: position = multiplier * position of `joint` + offset."""
 
     joint: Name
@@ -46,19 +46,19 @@ class Mimic(Part):
     """Position [rad or m] of this joint where that of the leader is 0."""
 
 
-class Fixed(JointPart):
+class FixedPart(JointPart):
     """Does not move."""
 
     type: Literal["fixed"]
 
 
-class Free(JointPart):
+class FreePart(JointPart):
     """Moves by the pose key frames of motion.free."""
 
     type: Literal["free"]
 
 
-class Revolute(JointPart):
+class RevolutePart(JointPart):
     """Turns about an axis."""
 
     type: Literal["revolute"]
@@ -77,7 +77,7 @@ class Revolute(JointPart):
     initial: Angle | None = None
     """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
     nearest to 0."""
-    mimic: Mimic | None = None
+    mimic: MimicPart | None = None
     """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
@@ -87,7 +87,7 @@ class Revolute(JointPart):
         return self
 
 
-class Continuous(JointPart):
+class ContinuousPart(JointPart):
     """Turns about an axis without position limits."""
 
     type: Literal["continuous"]
@@ -102,7 +102,7 @@ class Continuous(JointPart):
     initial: Angle | None = None
     """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
     nearest to 0."""
-    mimic: Mimic | None = None
+    mimic: MimicPart | None = None
     """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
@@ -111,7 +111,7 @@ class Continuous(JointPart):
         return self
 
 
-class Prismatic(JointPart):
+class PrismaticPart(JointPart):
     """Slides along an axis."""
 
     type: Literal["prismatic"]
@@ -130,7 +130,7 @@ class Prismatic(JointPart):
     initial: Length | None = None
     """Position [m] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
     nearest to 0."""
-    mimic: Mimic | None = None
+    mimic: MimicPart | None = None
     """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
@@ -140,7 +140,7 @@ class Prismatic(JointPart):
         return self
 
 
-def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
+def _check_limits(joint: RevolutePart | PrismaticPart, unit: str) -> None:
     if joint.lower > joint.upper:
         raise rejected(f"must not be above the upper limit {joint.upper:.6g} {unit}", at=("lower",))
     if joint.initial is not None and not joint.lower <= joint.initial <= joint.upper:
@@ -148,23 +148,23 @@ def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
         raise rejected(f"must be {between}", at=("initial",))
 
 
-def _check_initial(joint: Revolute | Continuous | Prismatic) -> None:
+def _check_initial(joint: RevolutePart | ContinuousPart | PrismaticPart) -> None:
     if joint.mimic is not None and joint.initial is not None:
         rule = f"has no effect on a joint that follows {joint.mimic.joint!r}; remove it"
         raise rejected(rule, at=("initial",))
 
 
-Joint = Annotated[Fixed | Revolute | Continuous | Prismatic | Free, Field(discriminator="type")]
+Joint = Annotated[FixedPart | RevolutePart | ContinuousPart | PrismaticPart | FreePart, Field(discriminator="type")]
 
 
-class Link(Part):
+class LinkPart(Part):
     """A rigid part: what it hangs on, how it moves against that, and the shapes it carries."""
 
     parent: Name | None = None
     """The link that carries this one; without it the link is the root of a tree and stands in the world."""
     pose: Pose = Pose()
     """Where the joint stands in the parent's frame (or in the world)."""
-    joint: Joint = Fixed(type="fixed")
+    joint: Joint = FixedPart(type="fixed")
     """How the link moves in the joint's frame."""
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""

@@ -10,7 +10,6 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import Problem, RecordingError, count
 from replay.kinematics.motion import FreeTrack, Track
@@ -20,6 +19,7 @@ from replay.logs.exported import ENDINGS, as_csv
 from replay.logs.joint_csv import read_csv
 from replay.logs.joint_log import Choice, JointLog, read_messages
 from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
+from replay.numerics.arrays import Floats
 from replay.scenario.names import SCALAR_JOINTS
 from replay.scenario.problems import did_you_mean
 from replay.scenario.recorded_followers import deviations, of_the_same_name
@@ -30,9 +30,7 @@ from replay.scenario.source import Library, SourceRule
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
-    from replay.scenario.motion import Recorded, RecordedFrame, RecordedJoint
-
-Floats = NDArray[np.float64]
+    from replay.scenario.motion import RecordedFramePart, RecordedJointPart, RecordedPart
 
 PATH = ("motion", "recorded")
 _TABLES = ("csv", "tsv")
@@ -41,7 +39,7 @@ _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
 
 
 @dataclass
-class Found:
+class RecordedMotion:
     """What a log says of a scenario's motion.
 
     Attributes:
@@ -61,7 +59,7 @@ class Found:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def read(scenario: Scenario, library: Library, name: str) -> Found:
+def read(scenario: Scenario, library: Library, name: str) -> RecordedMotion:
     """Return what the log of a scenario says.
 
     Args:
@@ -69,23 +67,23 @@ def read(scenario: Scenario, library: Library, name: str) -> Found:
         library: where its files are.
         name: of the log in the library: a file, or a ROS 2 bag's folder.
     """
-    return _Reader(scenario, library, name).found()
+    return _MotionReader(scenario, library, name).found()
 
 
-class _Reader:
+class _MotionReader:
     """Reads one scenario's log."""
 
     def __init__(self, scenario: Scenario, library: Library, name: str) -> None:
         assert scenario.motion.recorded is not None
         self._scenario = scenario
-        self._written: Recorded = scenario.motion.recorded
+        self._written: RecordedPart = scenario.motion.recorded
         self._library = library
         self._name = name
         self._linkage = linkage(scenario)
-        self._found = Found()
+        self._found = RecordedMotion()
         self._rows: set[int] = set()
 
-    def found(self) -> Found:
+    def found(self) -> RecordedMotion:
         """Return what it says."""
         found = self._found
         try:
@@ -186,9 +184,9 @@ class _Reader:
         end = begin + math.ceil(Fraction(self._scenario.duration) * 10**9)
         return Window(log.begin, begin, end, self._max_gap, log.published)
 
-    def _joints(self, log: JointLog) -> dict[str, RecordedJoint]:
+    def _joints(self, log: JointLog) -> dict[str, RecordedJointPart]:
         """Return the log's joint by joint of the scenario: as written, or those of the same name."""
-        from replay.scenario.motion import RecordedJoint
+        from replay.scenario.motion import RecordedJointPart
 
         if self._written.joints:
             return dict(self._written.joints)
@@ -196,7 +194,7 @@ class _Reader:
         for mine in self._scalar_joints():
             theirs = of_the_same_name(mine, log)
             if theirs and not self._scripted(mine) and mine not in self._linkage.followers:
-                common[mine] = RecordedJoint(name=theirs)
+                common[mine] = RecordedJointPart(name=theirs)
         if not common and not self._written.free:
             rule = f"has no joint of the scenario's names; it has {sorted(log.joints)}"
             raise Unusable((*PATH, "file"), f"{rule}: name them in motion.recorded.joints")
@@ -213,7 +211,7 @@ class _Reader:
             return "motion.points"
         return "motion.moves" if any(joint in self._scenario.target(move) for move in motion.moves) else ""
 
-    def _track(self, joint: str, source: RecordedJoint, log: JointLog, window: Window) -> Track:
+    def _track(self, joint: str, source: RecordedJointPart, log: JointLog, window: Window) -> Track:
         path = (*PATH, "joints", joint)
         mine = self._scalar_joints()
         if joint not in mine:
@@ -236,7 +234,7 @@ class _Reader:
         return Track(seconds, position, self._tolerance(path, joint, mine[joint], position))
 
     def _positions(
-        self, path: tuple[str | int, ...], kind: str, source: RecordedJoint, log: JointLog, window: Window
+        self, path: tuple[str | int, ...], kind: str, source: RecordedJointPart, log: JointLog, window: Window
     ) -> tuple[Floats, Floats]:
         """Return times (n,) [s] and positions (n,) [rad or m] that the log has of a joint of a kind."""
         dimension = LENGTH if kind == "prismatic" else ANGLE
@@ -253,12 +251,12 @@ class _Reader:
         return window.seconds(series.time), position
 
     def _compare_followers(self, log: JointLog, window: Window) -> None:
-        from replay.scenario.motion import RecordedJoint
+        from replay.scenario.motion import RecordedJointPart
 
         path = (*PATH, "file")
 
         def read(kind: str, name: str) -> tuple[Floats, Floats]:
-            return self._positions(path, kind, RecordedJoint(name=name), log, window)
+            return self._positions(path, kind, RecordedJointPart(name=name), log, window)
 
         joints = {joint.name: joint for joint in self._linkage.joints}
         for rule in deviations(joints, self._linkage.followers, self._found.tracks, log, read):
@@ -285,7 +283,7 @@ class _Reader:
             self._note(path, f"{rule} = {value:.3g} {dimension.si}")
         return value
 
-    def _free_track(self, link: str, frame: RecordedFrame, log: JointLog, window: Window) -> tuple[str, FreeTrack]:
+    def _free_track(self, link: str, frame: RecordedFramePart, log: JointLog, window: Window) -> tuple[str, FreeTrack]:
         path = (*PATH, "free", link)
         joints = {name: part.joint for name, part in self._scenario.links.items() if part.joint.type == "free"}
         if link not in joints:

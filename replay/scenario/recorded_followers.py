@@ -6,15 +6,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.kinematics.linkage import Joint, Mimic
 from replay.kinematics.motion import Track
 from replay.logs.csv_table import unit_of
 from replay.logs.joint_log import JointLog
+from replay.numerics.arrays import Floats
 from replay.scenario.recorded_series import Unusable
-
-Floats = NDArray[np.float64]
 
 
 def of_the_same_name(joint: str, log: JointLog) -> str:

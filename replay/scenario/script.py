@@ -15,8 +15,7 @@ from replay.language.units import Dimensioned
 from replay.numerics import transforms
 from replay.scenario import links
 from replay.scenario.model import Scenario
-from replay.scenario.motion import Keyframe as WrittenKeyframe
-from replay.scenario.motion import Waypoint as WrittenWaypoint
+from replay.scenario.motion import KeyframePart, WaypointPart
 
 
 def linkage(scenario: Scenario) -> Linkage:
@@ -93,10 +92,10 @@ def _where(scenario: Scenario, joint: str, time: float) -> tuple[str | int, ...]
     return ("motion", "points", joint, min(max(index, 0), len(points) - 1))
 
 
-def _link(name: str, link: links.Link) -> Link:
+def _link(name: str, link: links.LinkPart) -> Link:
     joint = link.joint
     result = Joint(joint.name or name, JointType(joint.type))
-    if isinstance(joint, links.Revolute | links.Continuous | links.Prismatic):
+    if isinstance(joint, links.RevolutePart | links.ContinuousPart | links.PrismaticPart):
         result = replace(
             result,
             axis=joint.axis,
@@ -105,16 +104,16 @@ def _link(name: str, link: links.Link) -> Link:
             deceleration=joint.deceleration,
             mimic=_mimic(joint.mimic),
         )
-    if isinstance(joint, links.Revolute | links.Prismatic):
+    if isinstance(joint, links.RevolutePart | links.PrismaticPart):
         result = replace(result, lower=joint.lower, upper=joint.upper)
     return Link(name, link.parent, link.pose.transform(), result)
 
 
-def _mimic(mimic: links.Mimic | None) -> Mimic | None:
+def _mimic(mimic: links.MimicPart | None) -> Mimic | None:
     return None if mimic is None else Mimic(mimic.joint, mimic.multiplier, mimic.offset.value)
 
 
-def _waypoint(point: WrittenWaypoint) -> Waypoint:
+def _waypoint(point: WaypointPart) -> Waypoint:
     return Waypoint(point.time, point.position.value, _value(point.velocity), _value(point.acceleration))
 
 
@@ -122,6 +121,6 @@ def _value(quantity: Dimensioned | None) -> float | None:
     return None if quantity is None else quantity.value
 
 
-def _keyframe(key: WrittenKeyframe) -> Keyframe:
+def _keyframe(key: KeyframePart) -> Keyframe:
     x, y, z, w = (float(value) for value in transforms.to_quaternion(key.transform()))
     return Keyframe(key.time, key.xyz, (x, y, z, w))

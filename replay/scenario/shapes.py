@@ -38,7 +38,7 @@ class ShapePart(Part):
     """Whether sensors sense the shape."""
 
 
-class Cube(ShapePart):
+class CubePart(ShapePart):
     """A cube centred at its origin."""
 
     type: Literal["cube"]
@@ -46,7 +46,7 @@ class Cube(ShapePart):
     """Edge length [m]."""
 
 
-class Cuboid(ShapePart):
+class CuboidPart(ShapePart):
     """A box centred at its origin."""
 
     type: Literal["cuboid"]
@@ -54,7 +54,7 @@ class Cuboid(ShapePart):
     """Edge lengths along x, y and z [m]."""
 
 
-class Plane(ShapePart):
+class PlanePart(ShapePart):
     """A rectangle in its xy plane, centred at its origin, facing +z."""
 
     type: Literal["plane"]
@@ -62,7 +62,7 @@ class Plane(ShapePart):
     """Edge lengths along x and y [m]."""
 
 
-class Curved(ShapePart):
+class CurvedPart(ShapePart):
     """What all tessellated shapes have in common."""
 
     radius: Size
@@ -76,20 +76,20 @@ class Curved(ShapePart):
         return self
 
 
-def _check_chord_error(shape: Curved | Ellipsoid, radius: float) -> None:
+def _check_chord_error(shape: CurvedPart | EllipsoidPart, radius: float) -> None:
     finest = FINEST_CHORD * radius
     if shape.chord_error < finest:
         given = "" if "chord_error" in shape.model_fields_set else f"({shape.chord_error:.6g} m when left out) "
         raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
 
 
-class Sphere(Curved):
+class SpherePart(CurvedPart):
     """A sphere around its origin."""
 
     type: Literal["sphere"]
 
 
-class Cylinder(Curved):
+class CylinderPart(CurvedPart):
     """A cylinder along z, its origin at half height."""
 
     type: Literal["cylinder"]
@@ -97,7 +97,7 @@ class Cylinder(Curved):
     """Height [m]."""
 
 
-class Cone(Curved):
+class ConePart(CurvedPart):
     """A cone along z with its apex at +z, its origin at half height."""
 
     type: Literal["cone"]
@@ -105,7 +105,7 @@ class Cone(Curved):
     """Height [m]."""
 
 
-class Capsule(Curved):
+class CapsulePart(CurvedPart):
     """A cylinder along z between two half spheres, its origin at half height."""
 
     type: Literal["capsule"]
@@ -113,7 +113,7 @@ class Capsule(Curved):
     """Height of the cylinder between the half spheres [m]."""
 
 
-class Ellipsoid(ShapePart):
+class EllipsoidPart(ShapePart):
     """An ellipsoid around its origin."""
 
     type: Literal["ellipsoid"]
@@ -128,7 +128,7 @@ class Ellipsoid(ShapePart):
         return self
 
 
-class Arc(Curved):
+class ArcPart(CurvedPart):
     """A bent bar in the xy plane, symmetric about +x: the C of a C-arm."""
 
     type: Literal["arc"]
@@ -150,7 +150,7 @@ def _kind_of_scale(value: object) -> str:
     return "axes" if isinstance(value, list | tuple) else "all"
 
 
-class Mesh(ShapePart):
+class MeshPart(ShapePart):
     """The triangles of a file."""
 
     type: Literal["mesh"]
@@ -177,5 +177,15 @@ class Mesh(ShapePart):
 
 
 Shape = Annotated[
-    Cube | Cuboid | Sphere | Cylinder | Cone | Capsule | Ellipsoid | Plane | Arc | Mesh, Field(discriminator="type")
+    CubePart
+    | CuboidPart
+    | SpherePart
+    | CylinderPart
+    | ConePart
+    | CapsulePart
+    | EllipsoidPart
+    | PlanePart
+    | ArcPart
+    | MeshPart,
+    Field(discriminator="type"),
 ]

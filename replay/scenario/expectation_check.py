@@ -1,0 +1,183 @@
+"""Whether a scenario's expectations hold, followed block by block while results stream past."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.collision.columns import CollisionColumns, Level
+from replay.language.fields import Part
+from replay.language.node import Place
+from replay.numerics.arrays import Floats, Integers
+from replay.scenario.expectations import Between, PairExpectation
+from replay.scenario.layout import Layout
+from replay.scenario.names import matches
+from replay.scenario.source import ScenarioProvenance
+from replay.scenario.tallies import Begin, Count, Extremes, Tally
+from replay.sensing.kind import Expected
+from replay.sensing.kinds import KINDS
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one line of an expectation.
+
+    Attributes:
+        expectation: as people read it: `detector* | patient*: contact never`.
+        place: where it is written; None when the scenario was not read from text.
+        passed: whether it held.
+        detail: the values and times that decided.
+    """
+
+    expectation: str
+    place: Place | None
+    passed: bool
+    detail: str
+
+
+@dataclass(frozen=True)
+class _Block:
+    collision: CollisionColumns | None
+    readings: Mapping[str, Any]
+
+
+@dataclass
+class _Check:
+    """One line of an expectation: what is taken from each block, and what is kept of it."""
+
+    text: str
+    path: tuple[str | int, ...]
+    what: str
+    take: Callable[[_Block], Floats]
+    state: Tally
+
+
+class ExpectationCheck:
+    """Follows expectations over all frames.
+
+    Args:
+        expectations: of the scenario.
+        layout: names behind the columns.
+        clearance, margin: the model's `collision.clearance` and the scenario's `collision.margin` [m]: they tell what a
+            clearance that was not computed means.
+        provenance: knows where the expectations are written.
+    """
+
+    def __init__(
+        self,
+        expectations: Sequence[Part],
+        layout: Layout,
+        *,
+        clearance: str = "near",
+        margin: float = math.inf,
+        provenance: ScenarioProvenance | None = None,
+    ) -> None:
+        self._layout = layout
+        self._clearance = clearance
+        self._margin = margin
+        self._provenance = provenance or ScenarioProvenance()
+        self._checks: list[_Check] = []
+        for index, expectation in enumerate(expectations):
+            if isinstance(expectation, PairExpectation):
+                self._add_pairs(("expect", index), expectation)
+                continue
+            for kind in KINDS.values():
+                if isinstance(expectation, kind.expectation):
+                    for expected in kind.expected:
+                        self._add_reading(("expect", index), kind.name, expectation, expected)
+
+    def update(self, time_ns: Integers, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
+        """Take the results of the next n frames, at times (n,) [ns]: of pairs, and of each kind of sensor by name."""
+        block = _Block(collision, readings)
+        for check in self._checks:
+            check.state.update(time_ns, check.take(block))
+
+    def finish(self) -> list[Outcome]:
+        """Return what became of each line, in the order they are written."""
+        outcomes = []
+        for check in self._checks:
+            passed, detail = check.state.result(check.what)
+            outcomes.append(Outcome(check.text, self._provenance.place(check.path), passed, detail))
+        return outcomes
+
+    def _add_pairs(self, path: tuple[str | int, ...], expected: PairExpectation) -> None:
+        columns = matching_pairs(self._layout.pairs, expected.pair)
+        about = " | ".join(expected.pair)
+
+        def reaches(level: Level) -> Callable[[_Block], Floats]:
+            def take(block: _Block) -> Floats:
+                assert block.collision is not None
+                reached: Floats = np.any(block.collision.level[:, columns] >= level, axis=1).astype(np.float64)
+                return reached
+
+            return take
+
+        if isinstance(expected.contact, Between):
+            begin, end = expected.contact.between
+            window = (round(begin * 1e9), round(end * 1e9))
+            text = f"{about}: contact begins between {begin:.6g} s and {end:.6g} s"
+            self._checks.append(_Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), Begin(window)))
+        elif expected.contact is not None:
+            text = f"{about}: contact {expected.contact}"
+            state = Count(expected.contact)
+            self._checks.append(_Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), state))
+        if expected.bounds is not None:
+            text, state = f"{about}: bounds {expected.bounds}", Count(expected.bounds)
+            self._checks.append(_Check(text, (*path, "bounds"), "bounds meet", reaches(Level.BOUNDS), state))
+        if expected.clearance is not None:
+            least = expected.clearance.min
+
+            def clearance(block: _Block) -> Floats:
+                assert block.collision is not None
+                part = block.collision.clearance[:, columns]
+                known = block.collision.evaluated[:, columns]
+                values = np.where(known, part, math.inf)
+                values = np.where(block.collision.level[:, columns] == Level.CONTACT, 0.0, values)
+                smallest = np.min(values, axis=1, initial=math.inf)
+                unknown = np.isinf(smallest) | (complete & ~known.all(axis=1) & (smallest > 0.0))
+                result: Floats = np.where(unknown, math.nan, smallest)
+                return result
+
+            complete = self._clearance != "near" or least > self._margin
+            bounds = Extremes("m", low=least, complete=complete)
+            text = f"{about}: clearance >= {least:.6g} m"
+            self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, bounds))
+
+    def _add_reading(self, path: tuple[str | int, ...], kind: str, written: Any, expected: Expected) -> None:
+        name = getattr(written, kind)
+        column = self._layout.sensors[kind].index(name)
+        asked = getattr(written, expected.what) if expected.inside else written
+        here = (*path, expected.what) if expected.inside else path
+
+        def take(block: _Block) -> Floats:
+            return expected.values(block.readings[kind])[:, column].astype(np.float64)
+
+        def add(text: str, where: tuple[str | int, ...], state: Tally) -> None:
+            self._checks.append(_Check(f"{name}: {expected.what} {text}", where, expected.what, take, state))
+
+        if expected.unit:
+            for key, bound, symbol in (("low", "min", ">="), ("high", "max", "<=")):
+                value = getattr(asked, bound, None)
+                if value is not None:
+                    state = Extremes(expected.unit, **{key: value})
+                    add(f"{symbol} {value:.6g} {expected.unit}", (*here, bound), state)
+        elif asked is not None:
+            add(asked, here, Count(asked))
+
+
+def matching_pairs(pairs: Sequence[str], patterns: tuple[str, str]) -> NDArray[np.intp]:
+    """Return the indices of the pairs "link/shape|link/shape" whose two sides two patterns match, either way round."""
+    found = []
+    for index, pair in enumerate(pairs):
+        (a, _, shape_a), (b, _, shape_b) = (side.partition("/") for side in pair.split("|"))
+        first, second = patterns
+        if (matches(first, a, shape_a) and matches(second, b, shape_b)) or (
+            matches(first, b, shape_b) and matches(second, a, shape_a)
+        ):
+            found.append(index)
+    return np.array(found, dtype=np.intp)
