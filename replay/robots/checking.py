@@ -16,7 +16,7 @@ from replay.collision.columns import Level
 from replay.errors import RobotError, ScenarioError
 from replay.kinematics.linkage import Linkage
 from replay.numerics.constants import FULL_TURN
-from replay.robots.part import Part
+from replay.robots.part import RobotPart
 from replay.scenario.load import load_from
 from replay.scenario.model import Scenario
 from replay.scenario.source import resolve_name
@@ -72,7 +72,7 @@ def valid(part: str, file: Path, meshes: Mapping[str, Path | bytes], *, deep: bo
         raise RobotError(str(file), f"would not be a valid part: {error.problems[0]}") from None
 
 
-def contacts(scenario: Scenario, part: Part, samples: int) -> Iterator[tuple[str, str, str]]:
+def needless_pairs(scenario: Scenario, part: RobotPart, samples: int) -> Iterator[tuple[str, str, str]]:
     """Yield the pairs of links that need no test, with what random poses show of them.
 
     Each joint is taken anywhere within its limits, or within a turn where it has none (a metre to either side, of one
@@ -139,7 +139,7 @@ def random_positions(machine: Linkage, samples: int) -> Floats:
     return machine.followed(positions)
 
 
-def _neighbours(part: Part) -> set[frozenset[str]]:
+def _neighbours(part: RobotPart) -> set[frozenset[str]]:
     """Return the pairs of links with bodies that a joint joins, or that only links without bodies are between."""
     bare: dict[str, str] = {}  # the uppermost of the links without bodies that hang together, by each of them
     found = set()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from replay.robots.xml_text import Element
+from replay.robots.xml_text import XmlElement
 
 Triple = tuple[float, float, float]
 
@@ -35,14 +35,14 @@ class Geometry:
 
 
 @dataclass(frozen=True)
-class Body:
+class RobotBody:
     """A shape on a link, its colour ("#rrggbb") if it has one, and the element that it was read from."""
 
     name: str
     origin: Origin
     geometry: Geometry
     color: str | None
-    element: Element
+    element: XmlElement
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class RobotLink:
     """A link: what collides, what is shown, and its element."""
 
     name: str
-    collisions: tuple[Body, ...]
-    visuals: tuple[Body, ...]
-    element: Element
+    collisions: tuple[RobotBody, ...]
+    visuals: tuple[RobotBody, ...]
+    element: XmlElement
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class RobotJoint:
     child: str
     origin: Origin
     axis: Triple
-    element: Element
+    element: XmlElement
     limits: Limits = Limits()
     mimic: Following | None = None
 
@@ -101,7 +101,7 @@ class RobotJoint:
 
 
 @dataclass(frozen=True)
-class Change:
+class RobotChange:
     """Something that the part does not say as the description does.
 
     Attributes:
@@ -133,4 +133,4 @@ class Robot:
     links: dict[str, RobotLink]
     joints: dict[str, RobotJoint]
     root: str
-    changes: list[Change] = field(default_factory=list)
+    changes: list[RobotChange] = field(default_factory=list)

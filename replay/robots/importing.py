@@ -14,10 +14,10 @@ from replay.errors import RecordingExistsError, RobotError, count
 from replay.language.units import ANGLE, LENGTH, quantity_rule
 from replay.logs.part_file import write_file
 from replay.robots import checking, joint_limits, part_text, srdf, urdf
-from replay.robots.description import Change, Origin, Triple
-from replay.robots.meshes import Meshes
+from replay.robots.description import Origin, RobotChange, Triple
+from replay.robots.meshes import RobotMeshes
 from replay.robots.packages import Packages, given
-from replay.robots.part import Part, make
+from replay.robots.part import RobotPart, make
 
 _MADE = "# SHA-256 of what follows: "
 
@@ -53,9 +53,9 @@ class Imported:
 
     name: str
     file: Path
-    part: Part
+    part: RobotPart
     meshes: tuple[Path, ...]
-    changes: tuple[Change, ...]
+    changes: tuple[RobotChange, ...]
     checked: tuple[tuple[str, str, str], ...] = field(default=())
 
     @property
@@ -118,7 +118,7 @@ def run(description: Path, output: Path, options: Options) -> Imported:
     if options.limits is not None:
         joint_limits.limited(robot, options.limits, _read(options.limits))
     joint_limits.accelerated(robot, joint_limits.accelerations(options.acceleration))
-    meshes = Meshes(Packages(description, given(options.packages)), output, options.copy_meshes)
+    meshes = RobotMeshes(Packages(description, given(options.packages)), output, options.copy_meshes)
     part = make(
         robot,
         semantics,
@@ -134,7 +134,7 @@ def run(description: Path, output: Path, options: Options) -> Imported:
     checked: tuple[tuple[str, str, str], ...] = ()
     scenario = checking.valid(text, output, meshes.sources, deep=options.samples > 0)
     if options.samples:
-        checked = tuple(checking.contacts(scenario, part, options.samples))
+        checked = tuple(checking.needless_pairs(scenario, part, options.samples))
         part.disabled.extend(checked)
         text = part_text.text(part, head, changes)
         checking.valid(text, output, meshes.sources)
@@ -188,7 +188,7 @@ def _pose(text: str) -> Origin:
     return Origin(xyz, (roll, pitch, yaw))
 
 
-def _alike(changes: Sequence[Change]) -> list[Change]:
+def _alike(changes: Sequence[RobotChange]) -> list[RobotChange]:
     """Return changes with those that say the same of several links or joints as one, the physical ones first."""
     places: dict[tuple[str, bool], list[str]] = {}
     for change in changes:
@@ -203,5 +203,5 @@ def _alike(changes: Sequence[Change]) -> list[Change]:
             first, *others = (place.partition(" ")[2] for place in named)
             shown = [f"{kinds.pop()}s {first}", *others]
         more = f", and {len(named) - 8} more" if len(named) > 8 else ""
-        merged.append(Change(", ".join(shown[:8]) + more, what, physical))
+        merged.append(RobotChange(", ".join(shown[:8]) + more, what, physical))
     return sorted(merged, key=lambda change: not change.physical)

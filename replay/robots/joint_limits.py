@@ -11,7 +11,7 @@ from typing import Any
 from replay.errors import Problem, RobotError, ScenarioError
 from replay.language.node import Node
 from replay.language.units import ACCELERATION, ANGULAR_ACCELERATION, Dimension, quantity_rule
-from replay.robots.description import Change, Limits, Robot, RobotJoint
+from replay.robots.description import Limits, Robot, RobotChange, RobotJoint
 from replay.robots.urdf import RATES, SLOWEST
 from replay.scenario.yaml_text import parse
 
@@ -48,7 +48,7 @@ def accelerated(robot: Robot, given: dict[Dimension, float]) -> None:
     if missing:
         shown = ", ".join(missing[:10]) + (", ..." if len(missing) > 10 else "")
         rule = "have no limit of acceleration, which moves need; --acceleration or --limits gives one"
-        robot.changes.append(Change(f"joints {shown}", rule))
+        robot.changes.append(RobotChange(f"joints {shown}", rule))
 
 
 def limited(robot: Robot, path: Path, data: bytes) -> None:
@@ -68,7 +68,7 @@ def limited(robot: Robot, path: Path, data: bytes) -> None:
     for name, entry in joints.mapping.items():
         if name not in robot.joints or not robot.joints[name].moves:
             kind = "no joint" if name not in robot.joints else f"a {robot.joints[name].type} joint"
-            robot.changes.append(Change(f"joint {name}", f"of {path.name} is {kind} of the robot: left out"))
+            robot.changes.append(RobotChange(f"joint {name}", f"of {path.name} is {kind} of the robot: left out"))
             continue
         joint = robot.joints[name]
         robot.joints[name] = replace(joint, limits=_limits(joint, entry, robot))
@@ -83,12 +83,12 @@ def _limits(joint: RobotJoint, entry: Node, robot: Robot) -> Limits:
             value = abs(_number(entry, f"max_{rate}"))
             if value < SLOWEST:
                 robot.changes.append(
-                    Change(place, f"a limit of {rate} of {value:g}, by which nothing moves, is left out")
+                    RobotChange(place, f"a limit of {rate} of {value:g}, by which nothing moves, is left out")
                 )
             else:
                 rates[rate] = value
     if _has(entry, "jerk"):
-        robot.changes.append(Change(place, "jerk is not limited: the limit of the joint limits is dropped", True))
+        robot.changes.append(RobotChange(place, "jerk is not limited: the limit of the joint limits is dropped", True))
     if _has(entry, "position") and joint.type != "continuous":
         lower, upper = _number(entry, "min_position"), _number(entry, "max_position")
         if lower > upper:

@@ -17,16 +17,16 @@ from replay.errors import RobotError, WriteError
 from replay.geometry.mesh_file import FORMATS
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.robots import dae_file
-from replay.robots.description import Change
-from replay.robots.names import Names
+from replay.robots.description import RobotChange
+from replay.robots.names import RobotNames
 from replay.robots.packages import Packages
-from replay.robots.xml_text import Element
+from replay.robots.xml_text import XmlElement
 
 _CONVERTED = ".dae"
 
 
 @dataclass
-class Meshes:
+class RobotMeshes:
     """What each mesh file of a robot is called in the part.
 
     Attributes:
@@ -43,11 +43,11 @@ class Meshes:
     copied: bool
     written: dict[Path, bytes | Path] = field(default_factory=dict)
     sources: dict[str, Path | bytes] = field(default_factory=dict)
-    changes: list[Change] = field(default_factory=list)
+    changes: list[RobotChange] = field(default_factory=list)
     _known: dict[Path, str] = field(default_factory=dict)
-    _names: Names = field(default_factory=Names)
+    _names: RobotNames = field(default_factory=RobotNames)
 
-    def name(self, written: str, element: Element) -> str:
+    def name(self, written: str, element: XmlElement) -> str:
         """Return what the part calls a file that a description names.
 
         Raises:
@@ -56,7 +56,7 @@ class Meshes:
         """
         found = self.packages.find(written, element)
         if found.assumed:
-            self.changes.append(Change("meshes", found.assumed))
+            self.changes.append(RobotChange("meshes", found.assumed))
         if found.path not in self._known:
             ending = found.path.suffix.lower()
             if ending not in (*FORMATS, _CONVERTED):
@@ -90,7 +90,7 @@ class Meshes:
             content, ending = _stl(found.triangles), ".stl"
             turned = "" if found.up == "Z_UP" else f", turned from {found.up} to z up"
             unit = "" if found.unit == 1.0 else f", from units of {found.unit:g} m to metres"
-            self.changes.append(Change(f"mesh {path.name}", f"is written as STL{unit}{turned}"))
+            self.changes.append(RobotChange(f"mesh {path.name}", f"is written as STL{unit}{turned}"))
         if not self.copied and content is path:
             name = self._in_place(path)
             self.sources[name] = path
@@ -110,7 +110,7 @@ class Meshes:
                 return packaged
             top = Path(os.path.commonpath([folder, path]))
             rule = f"scenarios that include this part must stand in {top}, or above; --copy-meshes copies the files"
-            note = Change("meshes", f"lie outside the part's folder: {rule}")
+            note = RobotChange("meshes", f"lie outside the part's folder: {rule}")
             if note not in self.changes:
                 self.changes.append(note)
         return PurePosixPath(os.path.relpath(path, folder)).as_posix()

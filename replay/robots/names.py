@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from replay.robots.description import Change
+from replay.robots.description import RobotChange
 
 _LONGEST = 100
 
 
-class Names:
+class RobotNames:
     """What the links, or the joints, or the bodies of one link are called in the part.
 
     Args:
@@ -40,8 +40,8 @@ class Names:
     def __contains__(self, name: str) -> bool:
         return name in self._called
 
-    def changes(self, kind: str) -> Iterable[Change]:
+    def changes(self, kind: str) -> Iterable[RobotChange]:
         """Yield which names had to be changed beyond their prefix."""
         for name, called in self._called.items():
             if called != self._prefix + name:
-                yield Change(f"{kind} {name}", f"is called {called}")
+                yield RobotChange(f"{kind} {name}", f"is called {called}")

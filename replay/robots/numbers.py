@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 
-from replay.robots.xml_text import Element
+from replay.robots.xml_text import XmlElement
 
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?")
 _INFINITE = re.compile(r"([-+]?)inf(inity)?", re.IGNORECASE)
 _LARGEST = 1e12
 
 
-def number(element: Element, name: str, default: float | None = None, *, infinite: bool = False) -> float:
+def number(element: XmlElement, name: str, default: float | None = None, *, infinite: bool = False) -> float:
     """Return an attribute as a number.
 
     Args:
@@ -37,7 +37,7 @@ def number(element: Element, name: str, default: float | None = None, *, infinit
     return value + 0.0
 
 
-def numbers(element: Element, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+def numbers(element: XmlElement, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
     """Return an attribute as so many numbers; see `number`."""
     if default is not None and not element.attributes.get(name, "").strip():
         return default
@@ -49,7 +49,7 @@ def numbers(element: Element, name: str, count: int, default: tuple[float, ...] 
     return tuple(value + 0.0 for value in values if value is not None)
 
 
-def size(element: Element, name: str) -> float:
+def size(element: XmlElement, name: str) -> float:
     """Return an attribute that is a length >= 0; RobotError if it is negative."""
     value = number(element, name)
     if value < 0.0:

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from replay import limits
 from replay.errors import RobotError
-from replay.robots.xml_text import Element
+from replay.robots.xml_text import XmlElement
 
 _UP = 4
 """Folders above a description that count as its own tree."""
@@ -44,7 +44,7 @@ class Packages:
         self._environment = os.environ if environment is None else environment
         self._known: dict[str, tuple[Path, ...]] = {}
 
-    def find(self, written: str, element: Element) -> Found:
+    def find(self, written: str, element: XmlElement) -> Found:
         """Return the file that is named.
 
         Args:
@@ -84,7 +84,7 @@ class Packages:
             found.extend(Path(entry).resolve() / below for entry in entries if entry)
         return tuple(found)
 
-    def _in_package(self, text: str, written: str, element: Element) -> Found:
+    def _in_package(self, text: str, written: str, element: XmlElement) -> Found:
         name, _, inside = text.lstrip("/").partition("/")
         steps = PurePosixPath(inside).parts
         if not name or not steps or inside.startswith("/") or ".." in (name, *steps):
@@ -106,7 +106,7 @@ class Packages:
             rule = f"looked for {', '.join(map(str, looked))}"
         raise element.wrong(f"{written[:200]!r} is not to be found: {rule}; give its folder with --package {name}=DIR")
 
-    def _existing(self, path: Path, trees: Iterable[Path], written: str, element: Element) -> Path:
+    def _existing(self, path: Path, trees: Iterable[Path], written: str, element: XmlElement) -> Path:
         """Return a path that is a file; RobotError if it is none, or not in one of the trees."""
         found = Path(os.path.normpath(path))
         real = found.resolve()

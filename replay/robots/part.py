@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from replay import limits
-from replay.robots.description import Body, Change, Geometry, Limits, Origin, Robot, RobotJoint, RobotLink
-from replay.robots.meshes import Meshes
-from replay.robots.names import Names
+from replay.robots.description import Geometry, Limits, Origin, Robot, RobotBody, RobotChange, RobotJoint, RobotLink
+from replay.robots.meshes import RobotMeshes
+from replay.robots.names import RobotNames
 from replay.robots.srdf import Semantics, rigid_pairs
 
 RIGID: Final = "rigid to each other"
@@ -21,7 +21,7 @@ Entry = dict[str, Any]
 
 
 @dataclass
-class Part:
+class RobotPart:
     """What the part holds, in the order in which it is written.
 
     Attributes:
@@ -36,18 +36,18 @@ class Part:
     poses: dict[str, dict[str, float]] = field(default_factory=dict)
     disabled: list[tuple[str, str, str]] = field(default_factory=list)
     called: dict[str, str] = field(default_factory=dict)
-    changes: list[Change] = field(default_factory=list)
+    changes: list[RobotChange] = field(default_factory=list)
 
 
 def make(
     robot: Robot,
     semantics: Semantics,
-    meshes: Meshes,
+    meshes: RobotMeshes,
     *,
     prefix: str = "",
     root_pose: Origin | None = None,
     visual: bool = False,
-) -> Part:
+) -> RobotPart:
     """Return a robot as a part.
 
     Args:
@@ -62,8 +62,8 @@ def make(
         RobotError: a mesh file is not to be found or not read.
         MissingPackageError: a mesh needs a package that is not installed.
     """
-    links, joints, poses = Names(prefix), Names(prefix), Names(prefix)
-    part = Part(called={link: links.take(link) for link in robot.links})
+    links, joints, poses = RobotNames(prefix), RobotNames(prefix), RobotNames(prefix)
+    part = RobotPart(called={link: links.take(link) for link in robot.links})
     for joint in robot.joints.values():
         joints.take(joint.name)
     carried = {joint.child: joint for joint in _without_conflicts(robot, part.changes).values()}
@@ -92,14 +92,14 @@ def _pose(origin: Origin) -> Entry:
     return entry
 
 
-def _joint(joint: RobotJoint, links: Names, joints: Names, robot: Robot, changes: list[Change]) -> Entry:
+def _joint(joint: RobotJoint, links: RobotNames, joints: RobotNames, robot: Robot, changes: list[RobotChange]) -> Entry:
     entry: Entry = {"parent": links[joint.parent]}
     if pose := _pose(joint.origin):
         entry["pose"] = pose
     if joint.type in ("floating", "planar"):
         if joint.type == "planar":
             rule = "is planar and becomes free: nothing keeps it in its plane"
-            changes.append(Change(f"joint {joint.name}", rule, True))
+            changes.append(RobotChange(f"joint {joint.name}", rule, True))
         entry["joint"] = {"name": joints[joint.name], "type": "free"}
     elif joint.moves:
         written: Entry = {"name": joints[joint.name], "type": joint.type, "axis": list(joint.axis)}
@@ -121,7 +121,7 @@ def _joint(joint: RobotJoint, links: Names, joints: Names, robot: Robot, changes
     return entry
 
 
-def _without_conflicts(robot: Robot, changes: list[Change]) -> Mapping[str, RobotJoint]:
+def _without_conflicts(robot: Robot, changes: list[RobotChange]) -> Mapping[str, RobotJoint]:
     """Return the joints, those that follow none that has a position held where they are.
 
     Limits of joints that follow are left out where their leader could be nowhere with them.
@@ -131,12 +131,14 @@ def _without_conflicts(robot: Robot, changes: list[Change]) -> Mapping[str, Robo
         place = f"joint {name}"
         if joint.mimic is None or not joint.moves:
             if joint.mimic is not None:
-                changes.append(Change(place, f"is {joint.type}: <mimic> is dropped"))
+                changes.append(RobotChange(place, f"is {joint.type}: <mimic> is dropped"))
                 found[name] = replace(joint, mimic=None)
             continue
         if not robot.joints[joint.mimic.joint].moves:
             held = joint.mimic.offset
-            changes.append(Change(place, f"mimics {joint.mimic.joint}, which has no position: it is held at {held:g}"))
+            changes.append(
+                RobotChange(place, f"mimics {joint.mimic.joint}, which has no position: it is held at {held:g}")
+            )
             kind = "revolute" if joint.type == "continuous" else joint.type
             found[name] = replace(joint, mimic=None, type=kind, limits=Limits(held, held))
     room = {name: (joint.limits.lower, joint.limits.upper) for name, joint in found.items() if joint.mimic is None}
@@ -156,7 +158,7 @@ def _without_conflicts(robot: Robot, changes: list[Change]) -> Mapping[str, Robo
         else:
             rule = f"its limits {joint.limits.lower:g} and {joint.limits.upper:g} are dropped"
             changes.append(
-                Change(f"joint {name}", f"{rule}: they leave no position to {leader}, which it follows", True)
+                RobotChange(f"joint {name}", f"{rule}: they leave no position to {leader}, which it follows", True)
             )
             found[name] = replace(joint, limits=replace(joint.limits, lower=-math.inf, upper=math.inf))
     return found
@@ -171,26 +173,26 @@ def _leader(joints: Mapping[str, RobotJoint], joint: RobotJoint) -> tuple[str, f
     return name, multiplier, offset
 
 
-def _shapes(link: RobotLink, meshes: Meshes, visual: bool, changes: list[Change]) -> dict[str, Entry]:
+def _shapes(link: RobotLink, meshes: RobotMeshes, visual: bool, changes: list[RobotChange]) -> dict[str, Entry]:
     """Return the shapes of a link by name: what collides, or what it shows where it is asked for and nothing does."""
     bodies, place = link.collisions, f"link {link.name}"
     if not bodies and link.visuals:
         if visual:
             bodies = link.visuals
-            changes.append(Change(place, "has no collision body: what it shows collides"))
+            changes.append(RobotChange(place, "has no collision body: what it shows collides"))
         else:
             rule = "shows a body that does not collide and is left out; --collision visual takes what is shown"
-            changes.append(Change(place, rule, True))
+            changes.append(RobotChange(place, rule, True))
     shown = next((body.color for body in link.visuals if body.color), None)
-    names, found = Names(), {}
+    names, found = RobotNames(), {}
     for body in bodies:
         geometry = body.geometry
         if geometry.kind != "mesh" and min(geometry.sizes) < SMALLEST and not _is_ball(geometry):
             if max(geometry.sizes) >= SMALLEST:
                 sizes = " ".join(f"{value:g}" for value in geometry.sizes)
-                changes.append(Change(place, f"a {geometry.kind} of {sizes} m has no volume: it is dropped", True))
+                changes.append(RobotChange(place, f"a {geometry.kind} of {sizes} m has no volume: it is dropped", True))
             else:
-                changes.append(Change(place, f"a {geometry.kind} without any extent is dropped"))
+                changes.append(RobotChange(place, f"a {geometry.kind} without any extent is dropped"))
             continue
         stem = geometry.file.rpartition("/")[2].rpartition(".")[0] if geometry.file else ""
         entry = _shape(body, meshes)
@@ -207,7 +209,7 @@ def _is_ball(geometry: Geometry) -> bool:
     return geometry.kind == "capsule" and geometry.sizes[0] >= SMALLEST
 
 
-def _shape(body: Body, meshes: Meshes) -> Entry:
+def _shape(body: RobotBody, meshes: RobotMeshes) -> Entry:
     geometry = body.geometry
     match geometry.kind:
         case "box":
@@ -232,7 +234,7 @@ def _chord(radius: float) -> Entry:
     return {"chord_error": float(f"{radius * (0.02 if radius < 0.05 else 1e-4):.3g}")}
 
 
-def _disabled(robot: Robot, semantics: Semantics, part: Part) -> Iterator[tuple[str, str, str]]:
+def _disabled(robot: Robot, semantics: Semantics, part: RobotPart) -> Iterator[tuple[str, str, str]]:
     """Yield the pairs that need no test: of the SRDF, and of links that are rigid to each other."""
     order = {link: place for place, link in enumerate(robot.links)}
     bodies = {link for link, called in part.called.items() if "shapes" in part.links[called]}
@@ -244,7 +246,7 @@ def _disabled(robot: Robot, semantics: Semantics, part: Part) -> Iterator[tuple[
         else:
             bare += 1
     if bare:
-        part.changes.append(Change("disabled pairs", f"{bare} of the SRDF have a link without bodies: left out"))
+        part.changes.append(RobotChange("disabled pairs", f"{bare} of the SRDF have a link without bodies: left out"))
     for number, (a, b) in enumerate(rigid_pairs(robot, bodies)):
         if number >= limits.ROBOT_PAIRS:
             rule = f"has more than the {limits.ROBOT_PAIRS} pairs of links in one rigid part that are written"

@@ -9,15 +9,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from replay.errors import printable
-from replay.robots.description import Change
-from replay.robots.part import Part
+from replay.robots.description import RobotChange
+from replay.robots.part import RobotPart
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./\-]*")
 _NOT_TEXT = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")
 """Words that some version of YAML takes for something else than text."""
 
 
-def text(part: Part, head: Iterable[str], changes: Iterable[Change]) -> str:
+def text(part: RobotPart, head: Iterable[str], changes: Iterable[RobotChange]) -> str:
     """Return the YAML of a part, below comments with where it comes from and what was changed."""
     lines = [*(f"# {printable(line)}" for line in head)]
     told = [f"#   {printable(str(change))}" for change in changes]

@@ -8,9 +8,9 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from replay.robots.description import Change, Robot
+from replay.robots.description import Robot, RobotChange
 from replay.robots.numbers import number
-from replay.robots.xml_text import Element, parse
+from replay.robots.xml_text import XmlElement, parse
 
 Pair = frozenset[str]
 
@@ -27,7 +27,7 @@ class Semantics:
 
     disabled: dict[Pair, str] = field(default_factory=dict)
     states: dict[str, dict[str, float]] = field(default_factory=dict)
-    changes: list[Change] = field(default_factory=list)
+    changes: list[RobotChange] = field(default_factory=list)
 
 
 def read(path: Path, data: bytes, robot: Robot) -> Semantics:
@@ -42,11 +42,11 @@ def read(path: Path, data: bytes, robot: Robot) -> Semantics:
     _read_states(root, robot, found)
     known = ("disable_collisions", "disable_default_collisions", "enable_collisions", "group_state", "group")
     others = Counter(child.tag for child in root.children if child.tag not in known)
-    found.changes.extend(Change(f"{times} x <{tag}>", "is not used") for tag, times in sorted(others.items()))
+    found.changes.extend(RobotChange(f"{times} x <{tag}>", "is not used") for tag, times in sorted(others.items()))
     return found
 
 
-def _read_pairs(root: Element, path: Path, robot: Robot, found: Semantics) -> None:
+def _read_pairs(root: XmlElement, path: Path, robot: Robot, found: Semantics) -> None:
     for element in root.all("disable_default_collisions"):
         link = element.text("link")
         for other in robot.links if _known(link, robot.links, element, found) else ():
@@ -65,16 +65,18 @@ def _read_pairs(root: Element, path: Path, robot: Robot, found: Semantics) -> No
                 found.disabled[frozenset(ends)] = reason or f"disabled in {path.name}"
 
 
-def _known(link: str, links: Mapping[str, object], element: Element, found: Semantics) -> bool:
+def _known(link: str, links: Mapping[str, object], element: XmlElement, found: Semantics) -> bool:
     if link in links:
         return True
-    change = Change(f"line {element.line} of the SRDF", f"<{element.tag}> names {link!r}, which is no link: left out")
+    change = RobotChange(
+        f"line {element.line} of the SRDF", f"<{element.tag}> names {link!r}, which is no link: left out"
+    )
     if change not in found.changes:
         found.changes.append(change)
     return False
 
 
-def _read_states(root: Element, robot: Robot, found: Semantics) -> None:
+def _read_states(root: XmlElement, robot: Robot, found: Semantics) -> None:
     """Read the states; one of several groups by its own name is called by its group's too."""
     states = list(root.all("group_state"))
     times = Counter(element.text("name") for element in states)
@@ -87,29 +89,29 @@ def _read_states(root: Element, robot: Robot, found: Semantics) -> None:
         if positions:
             found.states[called] = positions
         else:
-            found.changes.append(Change(f"state {called}", "holds no joint with a position: left out"))
+            found.changes.append(RobotChange(f"state {called}", "holds no joint with a position: left out"))
 
 
-def _positions(state: Element, called: str, robot: Robot, found: Semantics) -> Iterator[tuple[str, float]]:
+def _positions(state: XmlElement, called: str, robot: Robot, found: Semantics) -> Iterator[tuple[str, float]]:
     place = f"state {called}"
     for element in state.all("joint"):
         name = element.text("name")
         joint = robot.joints.get(name)
         if joint is None:
-            found.changes.append(Change(place, f"names {name!r}, which is no joint: left out"))
+            found.changes.append(RobotChange(place, f"names {name!r}, which is no joint: left out"))
         elif not joint.moves:
-            found.changes.append(Change(place, f"joint {name} is {joint.type}: left out"))
+            found.changes.append(RobotChange(place, f"joint {name} is {joint.type}: left out"))
         elif joint.mimic is not None:
-            found.changes.append(Change(place, f"joint {name} follows {joint.mimic.joint}: left out"))
+            found.changes.append(RobotChange(place, f"joint {name} follows {joint.mimic.joint}: left out"))
         elif len(element.text("value").split()) != 1:
-            found.changes.append(Change(place, f"joint {name} has several values: left out"))
+            found.changes.append(RobotChange(place, f"joint {name} has several values: left out"))
         else:
             value = number(element, "value")
             if joint.limits.lower <= value <= joint.limits.upper:
                 yield name, value
             else:
                 beyond = f"is beyond its limits {joint.limits.lower:g} and {joint.limits.upper:g}"
-                found.changes.append(Change(place, f"joint {name} at {value:g} {beyond}: left out"))
+                found.changes.append(RobotChange(place, f"joint {name} at {value:g} {beyond}: left out"))
 
 
 def rigid_pairs(robot: Robot, bodies: Container[str]) -> Iterator[tuple[str, str]]:

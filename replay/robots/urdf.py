@@ -9,19 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from replay.robots.description import (
-    Body,
-    Change,
     Following,
     Geometry,
     Limits,
     Origin,
     Robot,
+    RobotBody,
+    RobotChange,
     RobotJoint,
     RobotLink,
     Triple,
 )
 from replay.robots.numbers import number, numbers, size
-from replay.robots.xml_text import Element, parse
+from replay.robots.xml_text import XmlElement, parse
 
 _TYPES = ("fixed", "revolute", "continuous", "prismatic", "floating", "planar")
 _OF_A_LINK = {"visual", "collision", "inertial"}
@@ -36,7 +36,7 @@ def read(path: Path, data: bytes) -> Robot:
         RobotError: it is no URDF, or contradicts itself: the first thing that is wrong, with its line.
     """
     root = parse(path, data, root="robot")
-    changes: list[Change] = []
+    changes: list[RobotChange] = []
     colors = _colors(root, changes)
     links: dict[str, RobotLink] = {}
     for element in root.all("link"):
@@ -58,12 +58,12 @@ def read(path: Path, data: bytes) -> Robot:
     top = _root(root, links, joints)
     _check_mimics(joints)
     others = Counter(child.tag for child in root.children if child.tag not in ("link", "joint", "material"))
-    changes.extend(Change(f"{times} x <{tag}>", "is not used") for tag, times in sorted(others.items()))
+    changes.extend(RobotChange(f"{times} x <{tag}>", "is not used") for tag, times in sorted(others.items()))
     name = root.attributes.get("name", "").strip() or path.stem
     return Robot(name, links, _parents_first(top, joints), top, changes)
 
 
-def _colors(root: Element, changes: list[Change]) -> dict[str, str]:
+def _colors(root: XmlElement, changes: list[RobotChange]) -> dict[str, str]:
     """Return the colours of the materials that the robot itself names."""
     found = {}
     for material in root.all("material"):
@@ -73,31 +73,31 @@ def _colors(root: Element, changes: list[Change]) -> dict[str, str]:
     return found
 
 
-def _color(material: Element | None, known: Mapping[str, str], changes: list[Change]) -> str | None:
+def _color(material: XmlElement | None, known: Mapping[str, str], changes: list[RobotChange]) -> str | None:
     if material is None:
         return None
     written = material.first("color")
     if written is None:
         if material.first("texture") is not None:
-            changes.append(Change(f"material {material.attributes.get('name', '')!r}", "its texture is dropped"))
+            changes.append(RobotChange(f"material {material.attributes.get('name', '')!r}", "its texture is dropped"))
         return known.get(material.attributes.get("name", "").strip())
     shares = [min(max(share, 0.0), 1.0) for share in numbers(written, "rgba", 4)]
     text = "#" + "".join(f"{round(255.0 * share):02x}" for share in shares)
     return text.removesuffix("ff") if len(text) == 9 and text.endswith("ff") else text
 
 
-def _link(element: Element, colors: Mapping[str, str], changes: list[Change]) -> RobotLink:
+def _link(element: XmlElement, colors: Mapping[str, str], changes: list[RobotChange]) -> RobotLink:
     name = element.text("name")
     place = f"link {name}"
     bodies = {kind: tuple(_bodies(element, kind, colors, changes)) for kind in ("collision", "visual")}
     if element.first("inertial") is not None:
-        changes.append(Change(place, f"inertia {_UNUSED}"))
+        changes.append(RobotChange(place, f"inertia {_UNUSED}"))
     for tag in sorted({child.tag for child in element.children} - _OF_A_LINK):
-        changes.append(Change(place, f"<{tag}> is not used"))
+        changes.append(RobotChange(place, f"<{tag}> is not used"))
     return RobotLink(name, bodies["collision"], bodies["visual"], element)
 
 
-def _bodies(link: Element, kind: str, colors: Mapping[str, str], changes: list[Change]) -> list[Body]:
+def _bodies(link: XmlElement, kind: str, colors: Mapping[str, str], changes: list[RobotChange]) -> list[RobotBody]:
     found = []
     for element in link.all(kind):
         holder = element.first("geometry")
@@ -108,26 +108,26 @@ def _bodies(link: Element, kind: str, colors: Mapping[str, str], changes: list[C
             raise element.wrong(rule)
         geometry = _SHAPES[shapes[0].tag](shapes[0])
         color = _color(element.first("material"), colors, changes)
-        found.append(Body(element.attributes.get("name", "").strip(), _origin(element), geometry, color, element))
+        found.append(RobotBody(element.attributes.get("name", "").strip(), _origin(element), geometry, color, element))
     return found
 
 
-def _box(element: Element) -> Geometry:
+def _box(element: XmlElement) -> Geometry:
     sizes = numbers(element, "size", 3)
     if min(sizes) < 0.0:
         raise element.wrong(f"<box> has size={element.text('size')!r}, which is below 0")
     return Geometry("box", sizes)
 
 
-def _round(element: Element) -> Geometry:
+def _round(element: XmlElement) -> Geometry:
     return Geometry(element.tag, (size(element, "radius"), size(element, "length")))
 
 
-def _sphere(element: Element) -> Geometry:
+def _sphere(element: XmlElement) -> Geometry:
     return Geometry("sphere", (size(element, "radius"),))
 
 
-def _mesh(element: Element) -> Geometry:
+def _mesh(element: XmlElement) -> Geometry:
     file = element.text("filename")
     if len(element.attributes.get("scale", "").split()) == 1:
         scale = (number(element, "scale"),) * 3
@@ -141,7 +141,7 @@ def _mesh(element: Element) -> Geometry:
 _SHAPES = {"box": _box, "cylinder": _round, "sphere": _sphere, "capsule": _round, "mesh": _mesh}
 
 
-def _origin(element: Element) -> Origin:
+def _origin(element: XmlElement) -> Origin:
     written = element.first("origin")
     if written is None:
         return Origin()
@@ -154,7 +154,7 @@ def _triple(values: tuple[float, ...]) -> Triple:
     return x, y, z
 
 
-def _joint(element: Element, changes: list[Change]) -> RobotJoint:
+def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
     name, kind = element.text("name"), element.text("type")
     place = f"joint {name}"
     if kind not in _TYPES:
@@ -177,20 +177,20 @@ def _joint(element: Element, changes: list[Change]) -> RobotJoint:
         ("calibration", "<calibration> is not used"),
     ):
         if element.first(tag) is not None:
-            changes.append(Change(place, rule))
+            changes.append(RobotChange(place, rule))
     for tag in sorted({child.tag for child in element.children} - _OF_A_JOINT):
-        changes.append(Change(place, f"<{tag}> is not used"))
+        changes.append(RobotChange(place, f"<{tag}> is not used"))
     limits = _limits(element, name, kind, changes) if kind in ("revolute", "continuous", "prismatic") else Limits()
     origin, mimic = _origin(element), _mimic(element)
     return RobotJoint(name, kind, ends["parent"], ends["child"], origin, axis, element, limits, mimic)
 
 
-def _limits(joint: Element, name: str, kind: str, changes: list[Change]) -> Limits:
+def _limits(joint: XmlElement, name: str, kind: str, changes: list[RobotChange]) -> Limits:
     """Return the limits of a joint; lower and upper are 0 when a <limit> leaves them out."""
     place, limit = f"joint {name}", joint.first("limit")
     if limit is None:
         if kind != "continuous":
-            changes.append(Change(place, f"is {kind} without <limit>: it has no limits"))
+            changes.append(RobotChange(place, f"is {kind} without <limit>: it has no limits"))
         return Limits()
     found = Limits()
     if kind != "continuous":
@@ -201,13 +201,13 @@ def _limits(joint: Element, name: str, kind: str, changes: list[Change]) -> Limi
         found = Limits(lower, upper)
     velocity, acceleration, deceleration = (_rate(limit, rate, name, changes) for rate in RATES)
     if limit.attributes.get("jerk", "").strip():
-        changes.append(Change(place, f"jerk is not limited: the limit {limit.text('jerk')[:60]} is dropped", True))
+        changes.append(RobotChange(place, f"jerk is not limited: the limit {limit.text('jerk')[:60]} is dropped", True))
     if number(limit, "effort", 0.0, infinite=True) != 0.0:
-        changes.append(Change(place, f"effort {_UNUSED}"))
+        changes.append(RobotChange(place, f"effort {_UNUSED}"))
     return replace(found, velocity=velocity, acceleration=acceleration, deceleration=deceleration)
 
 
-def _rate(limit: Element, rate: str, joint: str, changes: list[Change]) -> float | None:
+def _rate(limit: XmlElement, rate: str, joint: str, changes: list[RobotChange]) -> float | None:
     if not limit.attributes.get(rate, "").strip():
         return None
     value = number(limit, rate, infinite=True)
@@ -215,7 +215,7 @@ def _rate(limit: Element, rate: str, joint: str, changes: list[Change]) -> float
         raise limit.wrong(f"joint {joint!r} has {rate}={value:g}, which is below 0")
     if value < SLOWEST:
         rule = f"a limit of {rate} of {value:g}, by which nothing moves, is left out"
-        changes.append(Change(f"joint {joint}", rule))
+        changes.append(RobotChange(f"joint {joint}", rule))
     return value if SLOWEST <= value < math.inf else None
 
 
@@ -224,14 +224,14 @@ SLOWEST = 1e-9
 """Smallest limit of velocity and acceleration that the language takes [per s, per s^2]."""
 
 
-def _mimic(joint: Element) -> Following | None:
+def _mimic(joint: XmlElement) -> Following | None:
     written = joint.first("mimic")
     if written is None:
         return None
     return Following(written.text("joint"), number(written, "multiplier", 1.0), number(written, "offset", 0.0))
 
 
-def _root(root: Element, links: Mapping[str, RobotLink], joints: Mapping[str, RobotJoint]) -> str:
+def _root(root: XmlElement, links: Mapping[str, RobotLink], joints: Mapping[str, RobotJoint]) -> str:
     """Return the link that all others hang on; RobotError where the links are no tree."""
     carried: dict[str, RobotJoint] = {}
     for joint in joints.values():

@@ -16,20 +16,20 @@ from replay.errors import RobotError
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
+class XmlElement:
     """An element with its attributes, the elements in it, and where it begins."""
 
     tag: str
     attributes: dict[str, str]
     file: str
     line: int
-    children: list[Element] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
 
-    def all(self, tag: str) -> Iterator[Element]:
+    def all(self, tag: str) -> Iterator[XmlElement]:
         """Yield the elements in it of a tag."""
         return (child for child in self.children if child.tag == tag)
 
-    def first(self, tag: str) -> Element | None:
+    def first(self, tag: str) -> XmlElement | None:
         """Return the first element in it of a tag, or None."""
         return next(self.all(tag), None)
 
@@ -45,7 +45,7 @@ class Element:
         return value
 
 
-def parse(path: Path | str, data: bytes, *, root: str) -> Element:
+def parse(path: Path | str, data: bytes, *, root: str) -> XmlElement:
     """Return the root element of an XML file.
 
     Args:
@@ -59,7 +59,7 @@ def parse(path: Path | str, data: bytes, *, root: str) -> Element:
     file = str(path)
     if len(data) > limits.ROBOT_XML:
         raise RobotError(file, f"has {len(data)} bytes; at most {limits.ROBOT_XML} are read")
-    found = _Builder(file).build(data)
+    found = _XmlBuilder(file).build(data)
     if "xacro" in Path(file).suffixes[-1:] or _is_xacro(found):
         name = Path(file).name
         target = re.sub(r"(\.urdf|\.srdf)?(\.xacro)?$", "", name) + (".srdf" if ".srdf" in name else ".urdf")
@@ -69,7 +69,7 @@ def parse(path: Path | str, data: bytes, *, root: str) -> Element:
     return found
 
 
-def _is_xacro(root: Element) -> bool:
+def _is_xacro(root: XmlElement) -> bool:
     """Return whether macros are left in what is read of a robot."""
     waiting = [child for child in root.children if child.tag in ("link", "joint", "material") or ":" in child.tag]
     while waiting:
@@ -81,20 +81,20 @@ def _is_xacro(root: Element) -> bool:
     return False
 
 
-class _Builder:
+class _XmlBuilder:
     def __init__(self, file: str, *, most: int = limits.ROBOT_ELEMENTS, kept: bool = True) -> None:
         self.file = file
         self.most = most
         self.kept = kept
-        self.root: Element | None = None
-        self.above: list[Element] = []
+        self.root: XmlElement | None = None
+        self.above: list[XmlElement] = []
         self.count = 0
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self.start
         self.parser.EndElementHandler = self.end
         self.parser.StartDoctypeDeclHandler = self.doctype
 
-    def build(self, data: bytes) -> Element:
+    def build(self, data: bytes) -> XmlElement:
         try:
             self.parser.Parse(data.removeprefix(b"\xef\xbb\xbf").lstrip(), True)
         except expat.ExpatError as error:
@@ -112,7 +112,7 @@ class _Builder:
             raise RobotError(self.file, f"has more than the {self.most} elements that are read", line=line)
         if len(self.above) >= limits.ROBOT_DEPTH:
             raise RobotError(self.file, f"has elements more than {limits.ROBOT_DEPTH} deep", line=line)
-        element = Element(tag, attributes, self.file, line)
+        element = XmlElement(tag, attributes, self.file, line)
         if not self.above:
             self.root = element
         elif self.kept:
@@ -136,4 +136,4 @@ def check(path: Path | str, data: bytes) -> None:
     file = str(path)
     if len(data) > limits.TEXT_MESH:
         raise RobotError(file, f"has {len(data)} bytes; at most {limits.TEXT_MESH} are read")
-    _Builder(file, most=limits.TRIANGLES, kept=False).build(data)
+    _XmlBuilder(file, most=limits.TRIANGLES, kept=False).build(data)

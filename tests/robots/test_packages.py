@@ -5,11 +5,11 @@ import pytest
 from replay.errors import RobotError
 from replay.robots.importing import Options, run
 from replay.robots.packages import Packages
-from replay.robots.xml_text import Element
+from replay.robots.xml_text import XmlElement
 from tests.robots import made
 from tests.robots.test_part import STL
 
-AT = Element("mesh", {}, "r.urdf", 7)
+AT = XmlElement("mesh", {}, "r.urdf", 7)
 
 
 def put(path):
