@@ -134,6 +134,20 @@ def simulate(
     yield from Simulation(build(scenario, model=model, savings=savings)).blocks()
 
 
+def touching(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the pairs that are in contact in the first frame."""
+    from replay.collision.columns import Level
+    from replay.kinematics.motion import sample
+
+    collision = _collision(scene)
+    if collision is None:
+        return ()
+    states = sample(scene.linkage, scene.script, scene.seconds(0, 1))
+    columns = collision.run(scene.linkage.forward(states.positions, states.free_poses))
+    levels = zip(scene.layout.pairs, columns.level[0], strict=True)
+    return tuple(name for name, level in levels if level == Level.CONTACT)
+
+
 def _collision(scene: Scene) -> CollisionPipeline | None:
     if not scene.pairs:
         return None

@@ -9,19 +9,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.collision.columns import Level
 from replay.errors import RobotError, ScenarioError
 from replay.kinematics.linkage import Linkage
+from replay.numerics.arrays import Floats
 from replay.numerics.constants import FULL_TURN
 from replay.robots.part import RobotPart
 from replay.scenario.load import load_from
 from replay.scenario.model import Scenario
 from replay.scenario.source import resolve_name
-
-Floats = NDArray[np.float64]
 
 _SEED = 1
 _BLOCK = 256

@@ -14,13 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import MissingPackageError, RobotError
+from replay.numerics.arrays import Floats
 from replay.robots.xml_text import check
-
-Array = NDArray[np.float64]
 
 _INSTALL = "get it with: pip install 'replay-mechanics[robots]'"
 _UP = {
@@ -41,7 +39,7 @@ class Collada:
         up: X_UP, Y_UP or Z_UP, as the file says.
     """
 
-    triangles: Array
+    triangles: Floats
     unit: float
     up: str
 
@@ -87,7 +85,7 @@ def read(path: Path, data: bytes) -> Collada:
     return Collada(unit * turned, unit, up)
 
 
-def _parts(file: Any, path: Path) -> Iterator[Array]:
+def _parts(file: Any, path: Path) -> Iterator[Floats]:
     """Yield the triangles of each geometry in each of its places, in the file's unit and axes."""
     count = visits = 0
     if file.scene is None:
@@ -115,7 +113,7 @@ def _parts(file: Any, path: Path) -> Iterator[Array]:
             waiting.extend((child, below, depth + 1) for child in reversed(node.children))
 
 
-def _corners(primitive: Any) -> Array:
+def _corners(primitive: Any) -> Floats:
     """Return the triangles (n, 3, 3) of a set of triangles or polygons; none of lines."""
     if hasattr(primitive, "triangleset"):
         primitive = primitive.triangleset()
@@ -128,12 +126,12 @@ def _corners(primitive: Any) -> Array:
     return vertices[index]
 
 
-def _product(a: Array, b: Array) -> Array:
+def _product(a: Floats, b: Floats) -> Floats:
     return np.array([[sum(a[i, k] * b[k, j] for k in range(4)) for j in range(4)] for i in range(4)])
 
 
-def _placed(pose: Array, triangles: Array) -> Array:
+def _placed(pose: Floats, triangles: Floats) -> Floats:
     moved = [sum(pose[r, c] * triangles[..., c] for c in range(3)) + pose[r, 3] for r in range(3)]
-    result: Array = np.stack(moved, axis=-1)
+    result: Floats = np.stack(moved, axis=-1)
     mirrored = float(np.linalg.det(pose[:3, :3])) < 0.0
     return result[:, [0, 2, 1]] if mirrored else result

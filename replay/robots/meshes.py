@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import RobotError, WriteError
 from replay.geometry.mesh_file import FORMATS
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.numerics.arrays import Floats
 from replay.robots import dae_file
 from replay.robots.description import RobotChange
 from replay.robots.names import RobotNames
@@ -126,7 +126,7 @@ def _in_python_package(path: Path) -> str | None:
     return None
 
 
-def _stl(triangles: NDArray[np.float64]) -> bytes:
+def _stl(triangles: Floats) -> bytes:
     """Return triangles (n, 3, 3) [m] as a binary STL file, in single precision."""
     if float(np.max(np.abs(triangles))) > float(np.finfo(np.float32).max):
         raise RobotError("mesh", "has coordinates beyond what STL holds")

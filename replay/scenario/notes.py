@@ -59,6 +59,17 @@ def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:
     return found
 
 
+def touching_note(pairs: Sequence[str]) -> list[str]:
+    """Return what is said of pairs "link/shape|link/shape" in contact in the first frame, and YAML to disable them."""
+    verb = "is" if len(pairs) == 1 else "are"
+    rule = f"{verb} in contact in the first frame; where they may be, write below collision.disable:"
+    sides = (pair.split("|") for pair in pairs)
+    return [
+        f"{count(len(pairs), 'pair')} {rule}",
+        *(f"    - {{pair: [{a}, {b}], reason: in contact from the first frame}}" for a, b in sides),
+    ]
+
+
 def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     """Yield the last move of each joint that still moves at the end, and when it ends [s]."""
     from replay.kinematics.motion import joint_profiles
