@@ -32,6 +32,13 @@ FILE = PathName()
 )
 @click.option("--prefix", default="", metavar="TEXT", help="Goes before the names of links, joints and poses.")
 @click.option("--root-pose", default="", metavar="POSE", help="Of the root link: 'X Y Z', or 'X Y Z ROLL PITCH YAW'.")
+@click.option(
+    "--up-axis",
+    type=click.Choice(["apply", "ignore"]),
+    default="apply",
+    show_default=True,
+    help="Of COLLADA meshes: apply turns to z what a file says is up; ignore reads it as RViz does.",
+)
 @click.option("--copy-meshes", is_flag=True, help="Copy the meshes beside the part, into a folder of its name.")
 @click.option("--check-collisions", "samples", type=int, metavar="N", help="Disable pairs by what N random poses show.")
 @click.option("--overwrite", is_flag=True, help="Replace a part that was changed by hand.")

@@ -44,8 +44,13 @@ class Collada:
     up: str
 
 
-def read(path: Path, data: bytes) -> Collada:
+def read(path: Path, data: bytes, *, turned: bool = True) -> Collada:
     """Return the triangles of a COLLADA file, each geometry in all places where its scene has it.
+
+    Args:
+        path: of the file, for errors.
+        data: its bytes.
+        turned: whether what the file says is up becomes z; else its axes stay x, y, z, as RViz reads it.
 
     Raises:
         MissingPackageError: pycollada is not installed.
@@ -80,7 +85,11 @@ def read(path: Path, data: bytes) -> Collada:
     if not np.isfinite(triangles).all():
         raise RobotError(str(path), "has corners that are not finite")
     turned = np.stack(
-        [sum(factor * triangles[..., k] for k, factor in enumerate(row) if factor) for row in _UP[up]], -1
+        [
+            sum(factor * triangles[..., k] for k, factor in enumerate(row) if factor)
+            for row in _UP[up if turned else "Z_UP"]
+        ],
+        -1,
     )
     return Collada(unit * turned, unit, up)
 

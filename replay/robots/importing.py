@@ -34,6 +34,7 @@ class Options:
     prefix: str = ""
     root_pose: str = ""
     copy_meshes: bool = False
+    up_axis: str = "apply"
     samples: int = 0
     overwrite: bool = False
 
@@ -118,7 +119,9 @@ def run(description: Path, output: Path, options: Options) -> Imported:
     if options.limits is not None:
         joint_limits.limited(robot, options.limits, _read(options.limits))
     joint_limits.accelerated(robot, joint_limits.accelerations(options.acceleration))
-    meshes = RobotMeshes(Packages(description, given(options.packages)), output, options.copy_meshes)
+    meshes = RobotMeshes(
+        Packages(description, given(options.packages)), output, options.copy_meshes, options.up_axis == "apply"
+    )
     part = make(
         robot,
         semantics,

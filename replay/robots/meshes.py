@@ -33,6 +33,7 @@ class RobotMeshes:
         packages: finds the files.
         part: the file that the part is written to.
         copied: whether files are copied beside it.
+        turned: whether COLLADA files are turned to z up by what they say is up.
         written: bytes to write, or the file to copy, by the path in which they will be.
         sources: file by its name in the part.
         changes: what a reader should know.
@@ -41,6 +42,7 @@ class RobotMeshes:
     packages: Packages
     part: Path
     copied: bool
+    turned: bool = True
     written: dict[Path, bytes | Path] = field(default_factory=dict)
     sources: dict[str, Path | bytes] = field(default_factory=dict)
     changes: list[RobotChange] = field(default_factory=list)
@@ -86,9 +88,9 @@ class RobotMeshes:
     def _placed(self, path: Path, ending: str) -> str:
         content: bytes | Path = path
         if ending == _CONVERTED:
-            found = dae_file.read(path, path.read_bytes())
+            found = dae_file.read(path, path.read_bytes(), turned=self.turned)
             content, ending = _stl(found.triangles), ".stl"
-            turned = "" if found.up == "Z_UP" else f", turned from {found.up} to z up"
+            turned = "" if found.up == "Z_UP" else _on_turning(found.up, self.turned)
             unit = "" if found.unit == 1.0 else f", from units of {found.unit:g} m to metres"
             self.changes.append(RobotChange(f"mesh {path.name}", f"is written as STL{unit}{turned}"))
         if not self.copied and content is path:
@@ -114,6 +116,12 @@ class RobotMeshes:
             if note not in self.changes:
                 self.changes.append(note)
         return PurePosixPath(os.path.relpath(path, folder)).as_posix()
+
+
+def _on_turning(up: str, turned: bool) -> str:
+    if turned:
+        return f", turned from {up} to z up; RViz, MoveIt and pinocchio leave it as it is, which --up-axis ignore does"
+    return f", not turned although it says {up}, as RViz, MoveIt and pinocchio read it"
 
 
 def _in_python_package(path: Path) -> str | None:

@@ -98,3 +98,16 @@ def test_an_import_writes_them_as_stl_beside_the_part(tmp_path):
     assert len(faces) == 4 and vertices.max(axis=0).tolist() == [1, 2, 3]
     assert "file: part/x.stl, scale: 2}" in done.file.read_text()
     assert "mesh x.dae: is written as STL, from units of 0.001 m to metres" in map(str, done.changes)
+
+
+def test_the_axis_that_points_up_can_be_left_as_it_is(tmp_path):
+    (tmp_path / "x.dae").write_bytes(dae(up="Y_UP"))
+    (tmp_path / "r.urdf").write_text(made.robot(made.link("a", '<mesh filename="x.dae"/>')))
+    for up_axis, most, rule in (
+        ("apply", [1000, 0, 2000], "turned from"),
+        ("ignore", [1000, 2000, 3000], "not turned"),
+    ):
+        done = run(tmp_path / "r.urdf", tmp_path / "part.yaml", Options(up_axis=up_axis))
+        vertices, _ = read_faces(tmp_path / "part" / "x.stl")
+        assert vertices.max(axis=0).tolist() == most
+        assert rule in str(done.changes[0]) and "RViz" in str(done.changes[0])
