@@ -84,14 +84,14 @@ def read(path: Path, data: bytes, *, turned: bool = True) -> Collada:
     triangles = np.concatenate(parts)
     if not np.isfinite(triangles).all():
         raise RobotError(str(path), "has corners that are not finite")
-    turned = np.stack(
+    upright: Floats = np.stack(
         [
             sum(factor * triangles[..., k] for k, factor in enumerate(row) if factor)
             for row in _UP[up if turned else "Z_UP"]
         ],
         -1,
     )
-    return Collada(unit * turned, unit, up)
+    return Collada(unit * upright, unit, up)
 
 
 def _parts(file: Any, path: Path) -> Iterator[Floats]:
