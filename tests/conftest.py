@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import settings
 
+from replay.numerics import remarks
 from replay.numerics.jit import progress
 
 settings.register_profile("seeded", derandomize=True, deadline=None)
@@ -10,5 +11,6 @@ settings.register_profile("soak", deadline=None, print_blob=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    progress.tell_by(lambda state: None, lambda text: None)  # else it would be in what tests read on stderr
+    progress.tell_by(lambda state: None)  # else it would be in what tests read on stderr
+    remarks.tell_by(lambda text: None)
     settings.load_profile("soak" if config.option.markexpr == "soak" else "seeded")
