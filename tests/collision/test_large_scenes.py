@@ -108,6 +108,7 @@ def test_near_pairs_are_those_whose_swept_boxes_meet():
     assert len(found) == len(a) > 300
 
 
+@pytest.mark.compiled
 def test_candidates_grow_with_the_bodies_not_with_their_pairs():
     looked_at = []
     for count in (100, 800):
