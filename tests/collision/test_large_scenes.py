@@ -53,6 +53,7 @@ def crowd(rng, *, trees, frames, away=0.0):
 @pytest.mark.parametrize("bounds", BOUNDS)
 @pytest.mark.parametrize("clearance", ["never", "near"])
 @pytest.mark.parametrize("away", [0.0, 1e6])
+@pytest.mark.compiled
 def test_a_tree_over_all_bodies_does_not_show(monkeypatch, bounds, clearance, away):
     rng = np.random.default_rng(21)
     bodies, linkage, poses = crowd(rng, trees=14, frames=24, away=away)
