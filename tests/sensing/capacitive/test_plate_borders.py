@@ -10,10 +10,10 @@ from replay.numerics import transforms
 from replay.numerics.double_double import triangle_area
 from replay.sensing.capacitive import exact, plate_integral
 from replay.sensing.capacitive.area_share import share
-from replay.sensing.capacitive.clusters import make_clusters
-from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from tests.amounts import cases
-from tests.sensing import plate_reference
+from tests.sensing.capacitive import plate_reference
 
 _HALVES = [(1.0, 1.0), (1.0, 3.0), (0.25, 0.5), (0.3, 0.7)]
 _SPANS = [(-2.0, 2.0), (-0.5, 2.0), (-2.0, 0.5), (-1.0, 1.0), (-0.5, 0.5), (1.0, 2.0), (-3.0, -1.0), (1.5, 2.0)]

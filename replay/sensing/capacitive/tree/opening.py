@@ -1,39 +1,104 @@
-"""Opening the parts of a sum where that pays most, until their error bounds are small enough; see `tree_sum`."""
+"""Opening the parts of a sum where that pays most, until their error bounds are within the budget."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.budget import Budget, SumTally, is_met
-from replay.sensing.capacitive.cluster_bounds import faces, judge_nodes
-from replay.sensing.capacitive.clusters import BEGIN, END, SECOND_CHILD, Clusters
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place
+from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes
+from replay.sensing.capacitive.tree.clusters import Clusters
+from replay.sensing.capacitive.tree.parts import Room, doubt_and_least, pop, push
+from replay.sensing.capacitive.tree.registers import (
     ALLOWED,
+    AREA,
+    BEGIN,
+    CENTROID,
+    CLUSTER,
     DROP,
+    END,
     ERROR,
     FIRST_RULE,
     FOUND,
+    FREE,
     KEEP,
     LANES,
     LEAST,
+    MEAN2,
+    PART,
+    POINTS_1,
+    RULE,
     RULE_FOUND,
+    SECOND_CHILD,
     VERDICT,
 )
-from replay.sensing.capacitive.part_queue import CLUSTER, FREE, PART, RULE, doubt_and_least, pop, push
-from replay.sensing.capacitive.placed_plate import PlacedPlate
-from replay.sensing.capacitive.room import Room
-from replay.sensing.capacitive.triangle_bounds import judge_triangles
-from replay.sensing.capacitive.triangle_rules import POINTS_1
+from replay.sensing.capacitive.tree.triangle_bounds import judge_triangles
 
 Floats = NDArray[np.float64]
 
 _EFFORT_RULE = 0.5
 """What it costs to take a triangle's next rule, against opening a node."""
+
+
+_FIRST_PARTS = 100.0
+"""A part with more than this fraction of the whole error is opened before the errors are compared."""
+
+
+class Budget(NamedTuple):
+    """What is asked of a sum.
+
+    Attributes:
+        rtol: largest relative error.
+        first: a part with a larger error is opened before the errors are compared [m].
+        scale: brings the errors of parts to the order of 1 at most [1/m].
+    """
+
+    rtol: float
+    first: float
+    scale: float
+
+
+class SumTally(NamedTuple):
+    """What is known of a sum.
+
+    Attributes:
+        done: sum over the triangles without a rule, as far as they are summed [m].
+        spent: bound of the error of `done` [m].
+        least: lower bound of the whole sum [m].
+        doubt: sum of the error bounds of the parts in the queue [m].
+    """
+
+    done: float
+    spent: float
+    least: float
+    doubt: float
+
+
+@inlined_kernel
+def budget_of(nodes: Floats, plate: PlacedPlate, rtol: float) -> Budget:
+    """Return the budget of a sum over all of a body's `Clusters.nodes`."""
+    ceiling = rtol * _least_of_root(nodes, plate)
+    return Budget(rtol, ceiling / _FIRST_PARTS, 1.0 / ceiling if ceiling > 0.0 else 1.0)
+
+
+@inlined_kernel
+def is_met(budget: Budget, tally: SumTally) -> bool:
+    """Return whether the error bounds are small enough."""
+    return tally.doubt + tally.spent <= budget.rtol * tally.least
+
+
+@inlined_kernel
+def _least_of_root(nodes: Floats, plate: PlacedPlate) -> float:
+    """Return a lower bound of the integral over all triangles [m], by Jensen."""
+    x, y, z = place(plate.T_plate_body, nodes[0, CENTROID], nodes[0, CENTROID + 1], nodes[0, CENTROID + 2])
+    u, v = beyond_borders(x, y, plate.half_x, plate.half_y)
+    square = u * u + v * v + z * z + nodes[0, MEAN2]
+    return nodes[0, AREA] / math.sqrt(square) if square > 0.0 else 0.0
 
 
 @leaf_kernel

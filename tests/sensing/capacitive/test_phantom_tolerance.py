@@ -8,8 +8,8 @@ import pytest
 from replay.bench.inputs import around, phantom
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.clusters import make_clusters
-from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 pytestmark = pytest.mark.compiled  # a phantom of 26 756 triangles

@@ -1,37 +1,6 @@
-"""The sum over a body's triangles with a stated tolerance: far clusters by their moments, near triangles exactly.
+"""The sum over a body's triangles with a stated tolerance, for every pose and plate; the folder's page says how.
 
-The tree is opened from the root until every part, a node or a triangle, has an error bound below what is allowed. From
-then on, as long as the bounds E add up to more than rtol times a lower bound of the sum, the parts with the most error
-per effort are opened, at least as much error as there is too much: a node into its children, a triangle into a rule of
-more points, and at last into pieces or the closed form. So the result meets rtol, and the work goes where it pays; what
-is small or far away may be relatively worse. The parts are summed at the end; nothing depends on other poses.
-Nodes, triangles and pieces are judged and summed many side by side, see `lanes`.
-
-Bounds. Let r be the distance components of the centroid in its region (u, v, z with the region's zeros), r its length,
-h the largest distance of a corner from the centroid, d a point's place about it, x = h/r < 2/3. Inside one region
-1/dist = 1/|r + Pd|, P dropping the region's zero components, and by Legendre's expansion
-
-    1/|r + Pd| = sum_k (-1)^k |Pd|^k P_k(cos) / r^(k+1),   |rest after order p| <= |d|^(p+1) / (r^(p+2) (1 - x)).
-
-- A cluster of area A takes orders 0, 2, 3, 4 from its moments (order 1 vanishes at the centroid). Order 5 is a form in
-  the mean of d d d d d, so it is at most the product of both Frobenius norms, and at most mean |d|^5:
-  E = A min(c |M5|, mean |d|^5)/r^6 + A mean |d|^6/(r^6 (r - h)); c^2 = 7.875, 4.203125 or 1 as P drops 0, 1 or 2.
-- Part of it may lie over a border, by w: there 1/dist is expanded in the wrong region's form, whose squared distance is
-  off by 0 to w^2, so the integral by 0 to B = A mean(w^2) / (2 (r - h)^3), of known sign: the sum is corrected by B/2,
-  and E += B/2. A point at d across the border, of at most D, lies over it by w <= d (W/D), W the largest w: the root of
-  mean(w^2) is at most W and (W/D) sigma. sigma, the standard deviation across the border, is at most the largest one in
-  any direction, and at most the root of D times the reach to the other side (Bhatia and Davis 2000). No cluster is
-  clipped for it. For a triangle mean(w^2) is known; it is off by A mean(w^2)/2 times something between 1/(r + h)^3 and
-  1/(r - h)^3.
-- Clusters are judged by outlines of half the digits: a place may be off by `blur`. So r is computed at the place found
-  and made smaller by blur, w and the root of its mean square are made larger by blur, and what lies within blur of
-  z = 0 is opened. The expansion itself has all digits; it is taken in the region in which the outline was judged.
-- A triangle: 1 point, E = A spread/(r - h)^3, borders or not, as the Hessian of 1/dist is at most 2/dist^3, spread =
-  mean |d|^2; 3 points of degree 2, E = c A h spread/(r^4 (1 - x)); 7 points of degree 5, E = c A h^4 spread/(r^7 (1 -
-  x)); 16 points of degree 8, E = c A h^7 spread/(r^10 (1 - x)); c see `triangle_rules`. A part above z = 0 has 1 point
-  and a bound of its own (`part_above`). What no rule fits is cut, see `hard_triangles`.
-- The mean of 1/dist is at least 1/sqrt(mean dist^2) (Jensen), and mean dist^2 <= r^2 + mean |d|^2 (what is linear in
-  d vanishes): a part brings at least A/sqrt(r^2 + mean |d|^2) >= A/r (1 - mean |d|^2/(2 r^2)).
+Infinity is asked for first, as all that is near a plate that a body saturates need not be summed.
 """
 
 from __future__ import annotations
@@ -44,17 +13,23 @@ from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import entry, kernel, leaf_kernel
-from replay.sensing.capacitive.budget import SumTally, budget_of
-from replay.sensing.capacitive.clusters import CLUSTERS_TYPE, Clusters
-from replay.sensing.capacitive.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.lanes import LANES
-from replay.sensing.capacitive.opening import refine
-from replay.sensing.capacitive.part_queue import empty
-from replay.sensing.capacitive.part_sum import sum_of_parts
-from replay.sensing.capacitive.placed_plate import PlacedPlate, placed_plate
-from replay.sensing.capacitive.room import Room, new_room
-from replay.sensing.capacitive.saturation import any_saturates, suspects
-from replay.sensing.capacitive.triangle_pieces import Pieces, new_pieces
+from replay.sensing.capacitive.contact import SATURATED, contact, may_touch
+from replay.sensing.capacitive.placed_plate import (
+    PlacedPlate,
+    beyond_borders,
+    faces_centre,
+    place,
+    place_triangle,
+    placed_plate,
+    write_triangle,
+)
+from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
+from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
+from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine
+from replay.sensing.capacitive.tree.part_sum import sum_of_parts
+from replay.sensing.capacitive.tree.parts import Room, empty, new_room
+from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
+from replay.sensing.capacitive.tree.triangle_pieces import Pieces, new_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -112,8 +87,8 @@ def _sum_one(
 ) -> tuple[float, bool, float]:
     """Return the integral over a body [m], whether it touches the plate, and the bound of the error [m]."""
     triangles = clusters.triangles
-    count = suspects(clusters, plate, room.stack, room.hard)
-    if count > 0 and any_saturates(triangles, room.hard, count, plate, pieces.triangle):
+    count = _suspects(clusters, plate, room.stack, room.hard)
+    if count > 0 and _any_saturates(triangles, room.hard, count, plate, pieces.triangle):
         return math.inf, True, 0.0
     empty(room.queue)
     budget, tally, lost = budget_of(clusters.nodes, plate, rtol), SumTally(0.0, 0.0, 0.0, 0.0), 0.0
@@ -158,3 +133,44 @@ def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone
     counts[CLUSTERS] += clusters
     counts[IN_CLUSTERS] += in_clusters
     counts[ALONE] += alone
+
+
+@leaf_kernel
+def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -> int:
+    """Write the triangles that may saturate to `found`; return how many. Only nodes that reach the plate are opened."""
+    T, half_x, half_y = plate.T_plate_body, plate.half_x, plate.half_y
+    nodes, links, triangles = clusters.nodes, clusters.links, clusters.triangles
+    stack[0] = 0
+    size, count = 1, 0
+    while size > 0:
+        size -= 1
+        index = stack[size]
+        x, y, z = place(T, nodes[index, CENTROID], nodes[index, CENTROID + 1], nodes[index, CENTROID + 2])
+        u, v = beyond_borders(x, y, half_x, half_y)
+        if math.sqrt(u * u + v * v + z * z) > 1.000001 * nodes[index, RADIUS] + 2.0 * plate.rounding:
+            continue
+        if links[index, SECOND_CHILD] >= 0:
+            stack[size], stack[size + 1] = links[index, SECOND_CHILD], index + 1
+            size += 2
+            continue
+        for k in range(links[index, BEGIN], links[index, END]):
+            a, b, c = place_triangle(plate, triangles, k)
+            counts = triangles[k, SIZE] > 0.0 and (not plate.facing or faces_centre(a, b, c, plate.rounding))
+            if counts and may_touch(a, b, c, half_x, half_y):
+                found[count] = k
+                count += 1
+    return count
+
+
+@kernel
+def _any_saturates(triangles: Floats, which: Ints, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
+    """Return whether one of the rows which[:count] of `triangles` makes the integral infinite.
+
+    `triangle` (3, 3) is scratch memory.
+    """
+    for i in range(count):
+        a, b, c = place_triangle(plate, triangles, which[i])
+        write_triangle(a, b, c, triangle)
+        if contact(triangle, plate.half_x, plate.half_y, plate.both) == SATURATED:
+            return True
+    return False

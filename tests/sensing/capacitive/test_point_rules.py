@@ -5,7 +5,8 @@ import pytest
 
 from replay.numerics.gauss import NODES_16, TRIANGLE_7, TRIANGLE_16, WEIGHTS_16
 from replay.sensing.capacitive import plate_integral
-from replay.sensing.capacitive.triangle_rules import POINTS_1, POINTS_3, POINTS_7, POINTS_16, part_above, rule_error
+from replay.sensing.capacitive.tree.registers import POINTS_1, POINTS_3, POINTS_7, POINTS_16
+from replay.sensing.capacitive.tree.triangle_bounds import part_above, rule_error
 from tests.amounts import cases
 
 _ONE = np.array([[1.0, 1.0, 1.0, 3.0]]).T / 3.0

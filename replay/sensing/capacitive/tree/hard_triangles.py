@@ -15,38 +15,41 @@ from numpy.typing import NDArray
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 from replay.numerics.log_difference import mean_inverse_linear
-from replay.sensing.capacitive.clusters import CORNERS, REACH, SIZE, SPREAD
-from replay.sensing.capacitive.contact import CLEAR, contact
+from replay.sensing.capacitive.contact import CLEAR, contact, may_touch
 from replay.sensing.capacitive.exact import integral_over_triangle
-from replay.sensing.capacitive.lanes import (
+from replay.sensing.capacitive.placed_plate import PlacedPlate, faces_centre, place_triangle, write_triangle
+from replay.sensing.capacitive.tree.lanes import load, padded
+from replay.sensing.capacitive.tree.part_sum import TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.tree.registers import (
     ALLOWED,
+    CORNERS,
     ERROR,
     FIRST_RULE,
     FOUND,
     LANES,
+    OWNER,
+    PIECE_COLUMNS,
+    PIECE_REGION,
+    PIECE_SHIFT,
+    POINTS_1,
+    POINTS_3,
+    REACH,
     REGION,
     RULE_FOUND,
     SHIFT,
+    SIZE,
+    SPREAD,
     SUM,
     VERDICT,
-    load,
-    padded,
 )
-from replay.sensing.capacitive.placed_plate import PlacedPlate, faces_centre, place_triangle, write_triangle
-from replay.sensing.capacitive.point_sums import TRIANGLE_3, sum_by_points
-from replay.sensing.capacitive.saturation import may_touch
-from replay.sensing.capacitive.triangle_bounds import judge_loaded
-from replay.sensing.capacitive.triangle_pieces import MOST_PIECES, OWNER, PIECE, Pieces, cut, quarter, write_piece
-from replay.sensing.capacitive.triangle_rules import POINTS_1, POINTS_3
+from replay.sensing.capacitive.tree.triangle_bounds import judge_loaded
+from replay.sensing.capacitive.tree.triangle_pieces import MOST_PIECES, Pieces, cut, quarter, write_piece
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 IN_FOUR = 2
 """How a piece is cut that no border runs through."""
-
-_WHERE, _BY = OWNER + 1, OWNER + 2
-"""Columns of a piece that has its rule: its region, and the correction for borders [m]."""
 
 
 @leaf_kernel
@@ -69,7 +72,7 @@ def sum_hard(
     slow, size, owners = 0, 0, 0
     for at in range(begin, begin + count):
         k = hard[at]
-        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, (plate.half_x, plate.half_y), triangles, k)
+        a, b, c = place_triangle(plate, triangles, k)
         area, low, high = triangles[k, SIZE], min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
         if may_touch(a, b, c, plate.half_x, plate.half_y):
             pieces.slow[slow] = k
@@ -105,7 +108,7 @@ def sum_exactly(triangles: Floats, plate: PlacedPlate, pieces: Pieces, count: in
     total, touching = 0.0, False
     for i in range(count):
         k = pieces.slow[i]
-        a, b, c = place_triangle(plate.T_plate_body, plate.rounding, (plate.half_x, plate.half_y), triangles, k)
+        a, b, c = place_triangle(plate, triangles, k)
         write_triangle(a, b, c, triangle)
         touching = touching or contact(triangle, half_x, half_y, both) != CLEAR
         if not (plate.facing and not faces_centre(a, b, c, plate.rounding)):
@@ -165,7 +168,7 @@ def _sum_pieces(pieces: Pieces, plate: PlacedPlate, size: int, lanes: Floats) ->
         size -= count
         for i in range(count):
             rows[i] = size + i
-        load(pool, PIECE, rows, count, lanes, 0)
+        load(pool, PIECE_COLUMNS, rows, count, lanes, 0)
         for i in range(count):
             owner = int(lanes[OWNER * LANES + i])
             rows[i] = owner
@@ -233,8 +236,8 @@ def _put_aside(pieces: Pieces, kind: int, i: int, lanes: Floats) -> None:
     pieces.in_done[kind] = row + 1
     for column in range(OWNER + 1):
         pieces.done[kind, row, column] = lanes[column * LANES + i]
-    pieces.done[kind, row, _WHERE] = lanes[(FOUND + REGION) * LANES + i]
-    pieces.done[kind, row, _BY] = lanes[(FOUND + SHIFT) * LANES + i]
+    pieces.done[kind, row, PIECE_REGION] = lanes[(FOUND + REGION) * LANES + i]
+    pieces.done[kind, row, PIECE_SHIFT] = lanes[(FOUND + SHIFT) * LANES + i]
 
 
 @leaf_kernel
@@ -245,8 +248,8 @@ def _sum_done(pieces: Pieces, plate: PlacedPlate, kind: int, lanes: Floats) -> N
     pieces.in_done[kind] = first
     for i in range(count):
         pieces.rows[i] = first + i
-    load(pieces.done[kind], PIECE, pieces.rows, count, lanes, 0)
+    load(pieces.done[kind], PIECE_COLUMNS, pieces.rows, count, lanes, 0)
     points = TRIANGLE_3 if kind == 0 else (TRIANGLE_7 if kind == 1 else TRIANGLE_16)
-    sum_by_points(points, count, plate, _WHERE, _BY, lanes)
+    sum_by_points(points, count, plate, PIECE_REGION, PIECE_SHIFT, lanes)
     for i in range(count):
         pieces.totals[int(lanes[OWNER * LANES + i])] += lanes[SUM * LANES + i]

@@ -13,9 +13,9 @@ from replay.errors import InvalidValue
 from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.contact import CLEAR, SATURATED, TOUCHING, contact
 from tests.amounts import cases
-from tests.sensing import plate_cases, plate_reference
+from tests.sensing.capacitive import plate_cases, plate_reference
 
-_HARD_CASES = Path(__file__).parent.parent / "data" / "plate_integral.json"
+_HARD_CASES = Path(__file__).parents[2] / "data" / "plate_integral.json"
 _TOLERANCE = 3e-14  # measured worst of 10 000 cases of 21 families: 7e-15 (close)
 
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import CORNERS, SIZE
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.lanes import LANES
 from replay.sensing.capacitive.placed_plate import Triple
+from replay.sensing.capacitive.tree.registers import CORNERS, LANES, OWNER, PIECE_COLUMNS, SIZE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,18 +22,14 @@ Ints = NDArray[np.int64]
 MOST_PIECES = 48
 """Pieces that may be made of a triangle before the closed form is called for, which then is cheaper."""
 
-OWNER = SIZE + 1
-PIECE = 16
-"""Columns of a piece; OWNER is the triangle it was cut from, by its row in what `Pieces` keeps of owners."""
-
 _POOL = LANES * (MOST_PIECES + 4)
 
 
 class Pieces(NamedTuple):
     """Memory for up to LANES hard triangles, the owners, and their pieces; made once for all poses."""
 
-    pool: Floats  # (_POOL, PIECE) pieces to judge
-    done: Floats  # (3, 2 LANES, PIECE) pieces that are to be summed by 3, 7 and 16 points
+    pool: Floats  # (_POOL, PIECE_COLUMNS) pieces to judge
+    done: Floats  # (3, 2 LANES, PIECE_COLUMNS) pieces that are to be summed by 3, 7 and 16 points
     in_done: Ints  # (3,)
     rows: Ints  # (LANES,)
     totals: Floats  # (LANES,) sum of an owner's pieces [m]
@@ -52,8 +47,8 @@ class Pieces(NamedTuple):
 def new_pieces() -> Pieces:
     """Return memory for hard triangles and pieces."""
     return Pieces(
-        np.empty((_POOL, PIECE)),
-        np.empty((3, 2 * LANES, PIECE)),
+        np.empty((_POOL, PIECE_COLUMNS)),
+        np.empty((3, 2 * LANES, PIECE_COLUMNS)),
         np.empty(3, np.int64),
         np.empty(LANES, np.int64),
         np.empty(LANES),

@@ -6,7 +6,8 @@ import pytest
 from replay.geometry.primitives import sphere
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
-from replay.sensing.capacitive.clusters import (
+from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
     FOURTH,
@@ -20,9 +21,8 @@ from replay.sensing.capacitive.clusters import (
     SECOND,
     SIGMA,
     SIZE,
-    make_clusters,
 )
-from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 _HALF_SIZES = np.array([[0.025, 0.1], [0.004, 0.006]])

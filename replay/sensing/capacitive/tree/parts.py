@@ -1,4 +1,4 @@
-"""The parts of a sum by their error per effort, worst first: a queue of buckets, half an octave each.
+"""The parts of a sum by their error per effort, worst first: a queue of buckets, half an octave each; and the memory.
 
 A part is a tree node or a triangle whose share is known within an error. Parts live in slots. A slot's row of `values`
 holds what was found of its part (see `lanes`), its row of `labels` what it is. The last that came into a bucket leaves
@@ -13,21 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, kernel
-from replay.sensing.capacitive.lanes import ERROR, FOUND, LANES, LEAST
-from replay.sensing.capacitive.triangle_rules import NO_RULE, PART_ABOVE
+from replay.sensing.capacitive.tree.registers import (
+    COLUMNS,
+    ERROR,
+    FOUND,
+    FREE,
+    LABELS,
+    LANES,
+    LEAST,
+    NEXT,
+    PART,
+    RULE,
+    RULES,
+    VALUES,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-PART, RULE, NEXT = range(3)
-"""Columns of `labels`: index of the node or triangle; a triangle's rule, CLUSTER or FREE; the next slot."""
-
-CLUSTER, FREE = NO_RULE, PART_ABOVE + 1
-RULES = FREE + 1
-
 _NONE = -1
 _USED, _HIGHEST, _UNUSED = range(3)
-VALUES, LABELS, BUCKETS = 4, 3, 256
+BUCKETS = 256
 _BUCKET_OF_ONE = 240
 _SHIFT = 51
 """A positive double shifted right by so many bits is its exponent and the first bit of its fraction."""
@@ -113,3 +119,31 @@ def doubt_and_least(queue: Queue, least: float) -> tuple[float, float]:
             doubt += queue.values[slot, ERROR]
             least += queue.values[slot, LEAST]
     return doubt, least
+
+
+class Room(NamedTuple):
+    """Memory for the sum over n triangles."""
+
+    queue: Queue
+    stack: Ints  # (n + LANES,) nodes to judge
+    tasks: Ints  # (n,) triangles to judge
+    firsts: Ints  # (n,) the first rule to try on each
+    hard: Ints  # (n,) triangles without a rule
+    lists: Ints  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
+    batch: Ints  # (LANES,) what the lanes are about
+    lanes: Floats  # (COLUMNS x LANES,)
+
+
+@kernel
+def new_room(n: int) -> Room:
+    """Return the memory for a sum over n triangles."""
+    return Room(
+        new_queue(n),
+        np.empty(n + LANES, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.int64),
+        np.empty((RULES + 1, max(n, RULES)), np.int64),
+        np.empty(LANES, np.int64),
+        np.zeros(COLUMNS * LANES),
+    )

@@ -1,4 +1,4 @@
-"""Whether a tree node can be summed as a whole, and how wrong that may be; the bounds are derived in `tree_sum`."""
+"""Whether a tree node can be summed as a whole, and how wrong that may be; the folder's page derives the bounds."""
 
 from __future__ import annotations
 
@@ -8,11 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.clusters import (
+from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, beyond_borders, region_of
+from replay.sensing.capacitive.tree.lanes import load, padded
+from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
+    DROP,
+    ERROR,
     FARTHEST_PLANE,
+    FOUND,
     HALF,
+    KEEP,
+    LANES,
+    LEAST,
     MEAN2,
     MEAN5,
     MEAN6,
@@ -20,26 +28,15 @@ from replay.sensing.capacitive.clusters import (
     NEAREST_PLANE,
     NORMAL,
     ODD5,
+    OPEN,
     OPENING,
     OUTLINE_COLUMNS,
     RADIUS,
-    SIGMA,
-)
-from replay.sensing.capacitive.lanes import (
-    DROP,
-    ERROR,
-    FOUND,
-    KEEP,
-    LANES,
-    LEAST,
-    OPEN,
     REGION,
     SHIFT,
+    SIGMA,
     VERDICT,
-    load,
-    padded,
 )
-from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, beyond_borders, region_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
