@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -28,6 +28,45 @@ class Level(enum.IntEnum):
     CONTACT = 2  # the shapes meet
 
 
+class Between(enum.IntEnum):
+    """What is known of a pair over the interval that ends at a frame."""
+
+    CLEAR = 0  # proven: the shapes do not meet at any moment of it
+    CONTACT = 1  # the shapes meet at a moment of it, its ends included
+    UNDECIDED = 2  # neither is proven
+    NOT_LOOKED = 3  # there is no interval, or nobody asked
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Moments at which levels of pairs begin or end: k entries, sorted by `latest`, then by pair.
+
+    A moment is known by a bracket: the level has changed by `latest`, a moment at which the poses show it, and nothing
+    is said of when, between `earliest` and `latest`, it did.
+
+    Attributes:
+        pair: (k,) column of the pair.
+        level: (k,) uint8, `Level.BOUNDS` or `Level.CONTACT`: this level or a higher one begins or ends.
+        begins: (k,) bool, whether it begins; else it ends.
+        earliest: (k,) [ns] from the scenario's start, rounded down.
+        latest: (k,) [ns], rounded up.
+        frame: (k,) frame of the scenario, the first at or after `latest`.
+    """
+
+    pair: Integers
+    level: Bytes
+    begins: Flags
+    earliest: Integers
+    latest: Integers
+    frame: Integers
+
+    @staticmethod
+    def none() -> Crossings:
+        """Return no entries."""
+        empty = np.zeros(0, dtype=np.int64)
+        return Crossings(empty, np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=bool), empty, empty, empty)
+
+
 @dataclass(frozen=True, eq=False)
 class CollisionColumns(Columns):
     """Collision results of n frames and P pairs.
@@ -37,12 +76,20 @@ class CollisionColumns(Columns):
         clearance: (n, P) [m], distance between the shapes; 0 in contact, NaN where not evaluated.
         evaluated: (n, P) bool, whether `clearance` is a distance.
         undecided: (n, P) bool, whether GJK reached its accuracy limit; the level is then contact, for safety.
+        between: (n, P) uint8, see `Between`, of the interval that ends at the frame; None in a recording of before it
+            was known, as `clearance_bound`.
+        clearance_bound: (n, P) [m], proven lower bound of the clearance over that interval; 0 in contact, NaN where not
+            looked at. It does not exceed the margin where the clearance is not evaluated.
+        crossings: what began and ended between the frames; not a column.
     """
 
     level: Annotated[Bytes, Field(states=Level, each="pairs", events=_LEVELS, begins=("overlap of bounds", "contact"))]
     clearance: Annotated[Floats, Field(unit="m", each="pairs", gate="evaluated", chart=_CHART)]
     evaluated: Annotated[Flags, Field(each="pairs", open=(1,), begins=("evaluation of the clearance",))]
     undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
+    between: Bytes | None = None
+    clearance_bound: Floats | None = None
+    crossings: Crossings = field(default_factory=Crossings.none)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from replay.collision import broad, candidates, narrow, relative, scan, support, traversal
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
-from replay.collision.columns import CollisionColumns, CollisionEntries
+from replay.collision.columns import Between, CollisionColumns, CollisionEntries
 from replay.collision.counters import Counters
 from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, Pair, PairRules
@@ -154,6 +154,8 @@ class CollisionPipeline:
             clearance=np.full(shape, np.nan),
             evaluated=np.zeros(shape, dtype=bool),
             undecided=np.zeros(shape, dtype=bool),
+            between=np.broadcast_to(np.uint8(Between.NOT_LOOKED), shape),
+            clearance_bound=np.broadcast_to(np.nan, shape),
         )
         for found in self._evaluate(poses):
             columns.level[:, found.columns] = found.level

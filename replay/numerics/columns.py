@@ -79,14 +79,15 @@ class Field:
 
 
 class Columns:
-    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`."""
+    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`; others are none."""
 
     @classmethod
     @functools.cache
     def fields(cls) -> tuple[Field, ...]:
         """Return the description of each column, in order."""
         hints = get_type_hints(cls, include_extras=True)
-        return tuple(_described(field.name, *get_args(hints[field.name])) for field in dataclasses.fields(cls))  # type: ignore[arg-type]
+        columns = (field.name for field in dataclasses.fields(cls) if hasattr(hints[field.name], "__metadata__"))  # type: ignore[arg-type]
+        return tuple(_described(name, *get_args(hints[name])) for name in columns)
 
     @classmethod
     def nothing(cls, frames: int, sensors: int, **counts: int) -> Self:
