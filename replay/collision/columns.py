@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.numerics.columns import Columns, Field
+from replay.numerics.columns import Columns, Field, Kind
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -67,6 +67,16 @@ class Crossings:
         return Crossings(empty, np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=bool), empty, empty, empty)
 
 
+_BETWEEN = Field(
+    kind=Kind.CATEGORY,
+    each="pairs",
+    states=Between,
+    open=(Between.CLEAR, Between.CONTACT, Between.UNDECIDED),
+    nothing=Between.NOT_LOOKED,
+    since=2,
+)
+
+
 @dataclass(frozen=True, eq=False)
 class CollisionColumns(Columns):
     """Collision results of n frames and P pairs.
@@ -87,8 +97,8 @@ class CollisionColumns(Columns):
     clearance: Annotated[Floats, Field(unit="m", each="pairs", gate="evaluated", chart=_CHART)]
     evaluated: Annotated[Flags, Field(each="pairs", open=(1,), begins=("evaluation of the clearance",))]
     undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
-    between: Bytes | None = None
-    clearance_bound: Floats | None = None
+    between: Annotated[Bytes | None, _BETWEEN] = None
+    clearance_bound: Annotated[Floats | None, Field(unit="m", each="pairs", gate="between", since=2)] = None
     crossings: Crossings = field(default_factory=Crossings.none)
 
 
