@@ -74,7 +74,7 @@ class _Intervals:
             self.number += len(frames)
 
     def __str__(self) -> str:
-        more = f" and {self.number - 1} times more" if self.number > 1 else ""
+        more = ("", " and once more", f" and {self.number - 1} times more")[min(self.number, 3) - 1]
         return f"between frames {self.first - 1} and {self.first}{more}"
 
 
