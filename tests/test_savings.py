@@ -42,6 +42,13 @@ def both(scenario, model=None):
             if getattr(blocks[0], group) is not None:
                 names = [field.name for field in dataclasses.fields(getattr(blocks[0], group))]
                 for name in names:
+                    if name == "crossings":
+                        parts = [getattr(getattr(b, group), name) for b in blocks]
+                        columns |= {
+                            f"crossings.{item.name}": np.concatenate([getattr(part, item.name) for part in parts])
+                            for item in dataclasses.fields(parts[0])
+                        }
+                        continue
                     columns[f"{group}.{name}"] = np.concatenate([getattr(getattr(b, group), name) for b in blocks])
         found.append((simulation, columns))
     return found
@@ -51,7 +58,7 @@ def compare(columns, others, rtol=0.0):
     """Bit for bit, but for clearances, and for what a tree summed."""
     assert columns.keys() == others.keys()
     for name, values in columns.items():
-        if name == "collision.clearance":
+        if name in ("collision.clearance", "collision.clearance_bound"):
             np.testing.assert_allclose(values, others[name], **CLEARANCE, err_msg=name)
         elif rtol and name.startswith("capacitive.") and values.dtype == np.float64:
             # a voltage is smoother than its capacitance; the delta output is at most as sensitive as it, relative to it

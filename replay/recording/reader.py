@@ -274,7 +274,8 @@ class _Assembly:
         if "/collision" not in self._topics:
             return None
         topic = self._topic("/collision")
-        return CollisionColumns(**{field.name: self._field(topic, field) for field in CollisionColumns.fields()})
+        columns: dict[str, Any] = {field.name: self._field(topic, field) for field in CollisionColumns.fields()}
+        return CollisionColumns(**columns)
 
     def _readings(self) -> dict[str, Any]:
         found = {}
