@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.collision.columns import Crossings
 from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.errors import InvalidValue
@@ -42,14 +43,10 @@ def both(scenario, model=None):
             if getattr(blocks[0], group) is not None:
                 names = [field.name for field in dataclasses.fields(getattr(blocks[0], group))]
                 for name in names:
-                    if name == "crossings":
-                        parts = [getattr(getattr(b, group), name) for b in blocks]
-                        columns |= {
-                            f"crossings.{item.name}": np.concatenate([getattr(part, item.name) for part in parts])
-                            for item in dataclasses.fields(parts[0])
-                        }
-                        continue
                     columns[f"{group}.{name}"] = np.concatenate([getattr(getattr(b, group), name) for b in blocks])
+            if group == "collision":
+                crossings = Crossings.joined([block.collision.crossings for block in blocks])
+                columns |= {f"crossings.{name}": values for name, values in vars(crossings).items()}
         found.append((simulation, columns))
     return found
 

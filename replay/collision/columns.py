@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import InitVar, dataclass, fields, replace
 from typing import Annotated
 
 import numpy as np
@@ -61,6 +61,14 @@ class Crossings:
     latest: Integers
     frame: Integers
 
+    def __eq__(self, other: object) -> bool:
+        names = [item.name for item in fields(Crossings)]
+        return isinstance(other, Crossings) and all(
+            np.array_equal(getattr(self, name), getattr(other, name)) for name in names
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
     @staticmethod
     def none() -> Crossings:
         """Return no entries."""
@@ -81,6 +89,9 @@ class Crossings:
     def of(self, pairs: Integers) -> Crossings:
         """Return the entries with pair k called pairs[k]."""
         return replace(self, pair=pairs[self.pair])
+
+
+NO_CROSSINGS = Crossings.none()
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +116,10 @@ class CollisionColumns(Columns):
     undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
     between: Bytes | None = None
     clearance_bound: Floats | None = None
-    crossings: Crossings = field(default_factory=Crossings.none)
+    crossings: InitVar[Crossings] = NO_CROSSINGS  # no column, so no field
+
+    def __post_init__(self, crossings: Crossings) -> None:
+        object.__setattr__(self, "crossings", crossings)
 
 
 @dataclass(frozen=True, eq=False)
