@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated
 
 import numpy as np
@@ -60,11 +61,34 @@ class Crossings:
     latest: Integers
     frame: Integers
 
+    def __eq__(self, other: object) -> bool:
+        names = [item.name for item in fields(Crossings)]
+        return isinstance(other, Crossings) and all(
+            np.array_equal(getattr(self, name), getattr(other, name)) for name in names
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
     @staticmethod
     def none() -> Crossings:
         """Return no entries."""
         empty = np.zeros(0, dtype=np.int64)
         return Crossings(empty, np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=bool), empty, empty, empty)
+
+    @staticmethod
+    def joined(parts: Sequence[Crossings]) -> Crossings:
+        """Return the entries of several as one; at one moment, higher levels begin last and end first."""
+        if not parts:
+            return Crossings.none()
+        names = [item.name for item in fields(Crossings)]
+        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        rank = np.where(columns["begins"], 1, -1) * columns["level"].astype(np.int64)
+        order = np.lexsort((rank, columns["pair"], columns["latest"]))
+        return Crossings(**{name: values[order] for name, values in columns.items()})
+
+    def of(self, pairs: Integers) -> Crossings:
+        """Return the entries with pair k called pairs[k]."""
+        return replace(self, pair=pairs[self.pair])
 
 
 _BETWEEN = Field(
