@@ -1,6 +1,5 @@
 """With every saving switched off the results are the same."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
