@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import Crossings, Level
-
-Integers = NDArray[np.int64]
+from replay.numerics.arrays import Integers
 
 
 @dataclass(frozen=True, eq=False)

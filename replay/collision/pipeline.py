@@ -14,7 +14,6 @@ from functools import partial
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import (
     broad,
@@ -30,7 +29,7 @@ from replay.collision import (
 )
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
-from replay.collision.columns import Between, CollisionColumns, CollisionEntries, Crossings
+from replay.collision.columns import MARGIN, Between, CollisionColumns, CollisionEntries, Crossings
 from replay.collision.counters import Counters
 from replay.collision.intervals import Course, Intervals, Known
 from replay.collision.pair_frames import PairFrames, unanswered
@@ -42,10 +41,8 @@ from replay.geometry import box_search, calipers, decomposition, principal_axes,
 from replay.kinematics import travel
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import entries_of
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LINK_PAIRS_AT_ONCE = 512
 """Relative poses held at a time: 512 link pairs of 256 frames are 16 MiB."""
@@ -118,7 +115,7 @@ class CollisionPipeline:
         narrowphase: Literal["gjk", "fcl"] = "gjk",
         pieces: Pieces = "exact",
         clearance: Literal["never", "near", "always"] = "near",
-        margin: float = 0.05,
+        margin: float = MARGIN,
         savings: bool = True,
         motion: Motion | None = None,
     ) -> None:
@@ -364,9 +361,9 @@ class _Found:
 
     columns: Integers
     rows: Integers
-    level: NDArray[np.uint8]
+    level: Bytes
     clearance: Floats
-    undecided: NDArray[np.bool_]
+    undecided: Flags
     known: Known | None
 
 

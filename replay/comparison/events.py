@@ -11,20 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison.moments import Happenings, Moments, gap, happenings
-from replay.comparison.signals import Column
+from replay.numerics.arrays import Column, Flags, Integers
 from replay.numerics.columns import Field, Kind
-
-Frames = NDArray[np.int64]
 
 MAX_OPTIMAL = 2000
 """Unmatched events of one track up to which the correspondence of least total shift is searched; above, in order."""
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class StateTrack:
     """One sequence of states whose changes are events.
 
     Attributes:
@@ -40,7 +37,7 @@ class Track:
     candidate: Column
     rest: int
     labels: dict[int | None, str]
-    time: Frames | None = None
+    time: Integers | None = None
     known: tuple[Moments | None, Moments | None] = (None, None)
     between: bool = True
 
@@ -61,12 +58,12 @@ class Matched:
         finer: (E,) whether one of the two is narrower than from frame to frame.
     """
 
-    state: Frames
-    baseline: Frames
-    candidate: Frames
-    times: tuple[Frames, Frames]
-    gap: Frames
-    finer: NDArray[np.bool_]
+    state: Integers
+    baseline: Integers
+    candidate: Integers
+    times: tuple[Integers, Integers]
+    gap: Integers
+    finer: Flags
 
 
 def tracks(
@@ -75,11 +72,11 @@ def tracks(
     candidate: Column,
     categories: tuple[str, ...],
     *,
-    time: Frames | None = None,
+    time: Integers | None = None,
     known: tuple[Moments | None, Moments | None] = (None, None),
     between: bool = True,
-) -> Iterator[Track]:
-    """Yield the tracks of a pair of state columns; see `Track` for the rest.
+) -> Iterator[StateTrack]:
+    """Yield the tracks of a pair of state columns; see `StateTrack` for the rest.
 
     Ordered states give one track a threshold: a run that goes from clear to contact at once and one that touches the
     bounds a frame before differ in when the bounds overlap, and not in their contact.
@@ -91,17 +88,17 @@ def tracks(
         names = dict(enumerate(categories, start=-1))
         names |= {state.value: state.name.lower().replace("_", " ") for state in field.states or ()}
         labels: dict[int | None, str] = {k: f"{field.name} becomes {text}" for k, text in names.items()}
-        yield Track(baseline, candidate, int(field.nothing), labels | {None: f"{field.name} becomes {{}}"})
+        yield StateTrack(baseline, candidate, int(field.nothing), labels | {None: f"{field.name} becomes {{}}"})
         return
     highest = max(len(field.begins), int(baseline.max()), int(candidate.max()))
     for threshold in range(1, highest + 1):
         name = field.begins[threshold - 1] if threshold <= len(field.begins) else f"{field.name} {threshold}"
         above = (baseline >= threshold).astype(np.int64), (candidate >= threshold).astype(np.int64)
         better = known[0] and known[0].at(threshold), known[1] and known[1].at(threshold)
-        yield Track(*above, 0, {1: f"{name} begins", 0: f"{name} ends"}, time, better, between)
+        yield StateTrack(*above, 0, {1: f"{name} begins", 0: f"{name} ends"}, time, better, between)
 
 
-def match(track: Track) -> Matched:
+def match(track: StateTrack) -> Matched:
     """Return the events of a track that are not the same in both runs, and which corresponds to which.
 
     Events that both runs have in the same frame are fixed. Between two of them, the events that lead to the same state
@@ -146,16 +143,16 @@ def match(track: Track) -> Matched:
     )
 
 
-def _columns(track: Track) -> tuple[Column, Column]:
+def _columns(track: StateTrack) -> tuple[Column, Column]:
     return track.baseline, track.candidate
 
 
-def _happenings(track: Track, column: Column, known: Moments | None) -> Happenings:
+def _happenings(track: StateTrack, column: Column, known: Moments | None) -> Happenings:
     time = np.arange(len(column)) if track.time is None else track.time
     return happenings(column, track.rest, time, known, between=track.between)
 
 
-def _repeats(run: Happenings) -> Frames:
+def _repeats(run: Happenings) -> Integers:
     """Return how often each state has been entered before in the same frame; zeros where frames tell all."""
     repeats = np.zeros(len(run.row), dtype=np.int64)
     (again,) = np.nonzero(run.row[1:] == run.row[:-1])
@@ -164,19 +161,19 @@ def _repeats(run: Happenings) -> Frames:
     return repeats
 
 
-def _places(keys: Frames, order: Frames, wanted: Frames) -> Frames:
+def _places(keys: Integers, order: Integers, wanted: Integers) -> Integers:
     """Return where, in the order of time, the events of some keys are; -1 for the key -1."""
-    found: Frames = np.where(wanted >= 0, order[np.searchsorted(keys, wanted)] if len(keys) else -1, -1)
+    found: Integers = np.where(wanted >= 0, order[np.searchsorted(keys, wanted)] if len(keys) else -1, -1)
     return found
 
 
-def _of(values: Frames, places: Frames) -> Frames:
+def _of(values: Integers, places: Integers) -> Integers:
     """Return values at places, -1 at those that are -1."""
-    found: Frames = np.where(places >= 0, values[places] if len(values) else -1, -1)
+    found: Integers = np.where(places >= 0, values[places] if len(values) else -1, -1)
     return found
 
 
-def _partners(key_a: Frames, key_b: Frames, fixed: Frames, span: int) -> Frames:
+def _partners(key_a: Integers, key_b: Integers, fixed: Integers, span: int) -> Integers:
     """Return for each event of a the index of the corresponding event of b, or -1; keys are state · span + frame."""
     partner = np.full(len(key_a), -1, dtype=np.int64)
     if not len(key_a) or not len(key_b):
@@ -198,13 +195,13 @@ def _partners(key_a: Frames, key_b: Frames, fixed: Frames, span: int) -> Frames:
     return partner
 
 
-def _gaps(keys: Frames, fixed: Frames, span: int) -> Frames:
+def _gaps(keys: Integers, fixed: Integers, span: int) -> Integers:
     """Return a number per event: equal where the same state is entered between the same fixed events; ascending."""
-    gap: Frames = np.searchsorted(fixed, keys) + (len(fixed) + 1) * (keys // span)
+    gap: Integers = np.searchsorted(fixed, keys) + (len(fixed) + 1) * (keys // span)
     return gap
 
 
-def _least_shift(a: Frames, b: Frames) -> Frames:
+def _least_shift(a: Integers, b: Integers) -> Integers:
     """Match all of the shorter of two ascending sequences to the longer, in order, with the least sum of |a - b|.
 
     Dynamic programme over (short, long): cost[i][j] = min(cost[i][j - 1], cost[i - 1][j - 1] + |short_i - long_j|).

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Integers
 from replay.numerics.columns import Field
 from replay.recording.events import Events
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class Moments:
 
     column: Integers
     state: Integers
-    begins: NDArray[np.bool_]
+    begins: Flags
     frame: Integers
     earliest: Integers
     latest: Integers
@@ -57,7 +55,7 @@ class Moments:
         _, counts = np.unique(np.stack([of.column, of.frame]), axis=1, return_counts=True)
         return int((counts // 2).sum())
 
-    def _taken(self, which: slice | NDArray[np.bool_]) -> Moments:
+    def _taken(self, which: slice | Flags) -> Moments:
         values = self.column[which], self.state[which], self.begins[which]
         return Moments(*values, self.frame[which], self.earliest[which], self.latest[which])
 
@@ -108,7 +106,7 @@ class Happenings:
     row: Integers
     earliest: Integers
     latest: Integers
-    finer: NDArray[np.bool_]
+    finer: Flags
 
 
 def happenings(column: Integers, rest: int, time: Integers, known: Moments | None, *, between: bool) -> Happenings:

@@ -14,21 +14,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import Between, CollisionColumns
 from replay.comparison.moments import Moments, moments
+from replay.numerics.arrays import Column
 from replay.numerics.columns import Columns, Field, Kind, components
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.recording.reader import Recording
     from replay.simulation import Layout
-
-Column = NDArray[Any]
 
 SCHEMAS = "/schemas"
 """Begins the name of a field in changes and rules: `/schemas/collision/clearance`."""

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from replay.collision.columns import Between, CollisionColumns, Level
 from replay.errors import count
 from replay.language.fields import When
-from replay.scenario.tallies import Extremes, Times, shown_seconds
-
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
+from replay.numerics.arrays import Flags, Floats, Integers
+from replay.scenario.tallies import Extremes, shown_seconds
 
 _NARROW = 10_000
 """A bracket up to so many nanoseconds is told by the shortest number in it, a wider one by its end."""
@@ -98,7 +96,7 @@ class Meetings:
     surely_first: bool = True
     _last: Flags | None = None
 
-    def update(self, time_ns: Times, block: Seen) -> None:
+    def update(self, time_ns: Integers, block: Seen) -> None:
         """See `Tally`."""
         begin = self.frames
         last = np.zeros_like(block.reached[:1]) if self._last is None else self._last
@@ -140,7 +138,7 @@ class Meetings:
         inside = self.window[0] <= self.first[1] and self.first[0] <= self.window[1]
         return inside and not doubt, f"{what} begins at {shown(self.first)}{doubt}"
 
-    def _find_first(self, time_ns: Times, block: Seen, met: Flags, begin: int) -> None:
+    def _find_first(self, time_ns: Integers, block: Seen, met: Flags, begin: int) -> None:
         """Look for the first meeting: the crossing with which it begins, else the frame that shows it."""
         at = int(np.argmax(met)) if met.any() else len(met)
         self.surely_first = self.surely_first and not block.unproven[: at + 1].any()
@@ -156,7 +154,7 @@ class Meetings:
             if len(ends) and not block.reached[at].any():
                 self.until = int(block.earliest[ends[0]]), int(block.latest[ends[0]])
 
-    def _apart(self, time_ns: Times, block: Seen, before: Flags, begin: int) -> Iterator[tuple[int, int]]:
+    def _apart(self, time_ns: Integers, block: Seen, before: Flags, begin: int) -> Iterator[tuple[int, int]]:
         """Yield when all pairs are apart: in a frame, or between two of which one pair ends before the other begins."""
         so = _any(block.reached)
         handed = so & _any(before) & ~_any(block.reached & before)
@@ -185,7 +183,7 @@ class Clearances:
     bound: float = np.inf
     meetings: Meetings = field(default_factory=lambda: Meetings("never"))
 
-    def update(self, time_ns: Times, block: tuple[NDArray[np.float64], NDArray[np.float64], Seen]) -> None:
+    def update(self, time_ns: Integers, block: tuple[Floats, Floats, Seen]) -> None:
         """Take smallest clearances and bounds, (n,) [m] each, NaN for none, and how the pairs meet; see `Tally`."""
         values, bounds, meetings = block
         self.sampled.update(time_ns, values)

@@ -7,17 +7,16 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import MotionLimitError, Problem
 from replay.geometry.solid import Solid
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.scenario import frames
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
 
-Floats = NDArray[np.float64]
 
 _FRAMES_AT_ONCE = 1024
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import InvalidValue
 from replay.geometry.tree import Tree, triangle_tree
-
-Array = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +27,12 @@ class Target:
 
     name: str
     link: int
-    triangles: Array
+    triangles: Floats
     tree: Tree
-    closing: Array | None = None
+    closing: Floats | None = None
 
 
-def make_target(name: str, link: int, triangles: ArrayLike, *, closing: Array | None = None) -> Target:
+def make_target(name: str, link: int, triangles: ArrayLike, *, closing: Floats | None = None) -> Target:
     """Return the target of a shape.
 
     Args:

@@ -16,7 +16,7 @@ import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.collision.columns import Between
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 
 TUNNEL = """
 version: 1
@@ -182,8 +182,8 @@ def test_runs_of_both_models_are_compared(tmp_path: Path, recorded: Path, capsys
     assert run(["run", str(path), "-o", str(tmp_path / "out"), "--no-rrd"]) is ExitCode.FINE
     frames, proof = tmp_path / "out" / "tunnel" / "tunnel.mcap", recorded / "tunnel.mcap"
     found = replay.diff(frames, proof, rules=RULES)
-    assert found.verdict is Verdict.SAME
+    assert found.verdict is DiffVerdict.SAME
     told = {change.name: change.candidate for change in found.provenance}
     assert told["/collision"] == "between, clearance_bound (2 signals); 1 contact between two frames"
     assert told["model.collision.between"] == "proven@1"
-    assert replay.diff(proof, frames, rules=RULES).verdict is Verdict.DIFFERENT
+    assert replay.diff(proof, frames, rules=RULES).verdict is DiffVerdict.DIFFERENT

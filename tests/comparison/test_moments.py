@@ -11,7 +11,7 @@ import pytest
 from replay.collision.columns import Between
 from replay.comparison import wording
 from replay.comparison.diff import compare
-from replay.comparison.difference import Fate, Verdict
+from replay.comparison.difference import DiffVerdict, Fate
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.runs import Case, RunDifference
 from replay.comparison.suggest import suggest
@@ -66,7 +66,7 @@ def level_of(found):
 @pytest.mark.parametrize("shift", [0, 1, -400, 999, 1000, -1000])
 def test_brackets_that_overlap_or_touch_are_the_same(shift):
     found = compare(BASELINE, proven([(BEGIN + shift, True), (END - shift, False)]))
-    assert found.verdict is Verdict.SAME and found.signals == () and found.scene == ()
+    assert found.verdict is DiffVerdict.SAME and found.signals == () and found.scene == ()
 
 
 @pytest.mark.parametrize("shift", [1001, -1001, 250_000, -5_000_000])
@@ -79,14 +79,14 @@ def test_the_shift_is_the_gap_between_brackets(shift):
     assert event.shift == pytest.approx(gap * 1e-9, abs=1e-15)
     assert event.baseline.time == BEGIN / 1e9 and event.candidate.time == (BEGIN + shift) / 1e9
     assert f"contact begins {abs(gap) / 1e3:.4g} us {'later' if shift > 0 else 'earlier'}: " in wording.event(event)
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     much = abs(gap) * 1e-9
     for tolerance, verdict in [
-        ({"time": 1.01 * much + 1e-9}, Verdict.SAME),
-        ({"time": 0.99 * much - 2e-9}, Verdict.DIFFERENT),
-        ({"frames": 1}, Verdict.SAME),
-        ({"frames": 1, "bracket": 1.01 * much}, Verdict.SAME),
-        ({"frames": 1, "bracket": 0.99 * much}, Verdict.DIFFERENT),
+        ({"time": 1.01 * much + 1e-9}, DiffVerdict.SAME),
+        ({"time": 0.99 * much - 2e-9}, DiffVerdict.DIFFERENT),
+        ({"frames": 1}, DiffVerdict.SAME),
+        ({"frames": 1, "bracket": 1.01 * much}, DiffVerdict.SAME),
+        ({"frames": 1, "bracket": 0.99 * much}, DiffVerdict.DIFFERENT),
     ]:
         if tolerance.get("time", 1.0) > 0.0:
             assert compare(BASELINE, other, rules=rules(**tolerance)).verdict is verdict, tolerance
@@ -100,14 +100,14 @@ def test_a_moment_on_the_other_side_of_a_frame_is_as_far_as_its_bracket():
     )
     (event,) = level_of(compare(before, after, rules=rules())).events
     assert (event.shift_frames, event.shift) == (1, pytest.approx(500e-9))
-    assert compare(before, after, rules=rules(bracket=1e-6)).verdict is Verdict.SAME
-    assert compare(before, after, rules=rules(bracket=4e-7)).verdict is Verdict.DIFFERENT
+    assert compare(before, after, rules=rules(bracket=1e-6)).verdict is DiffVerdict.SAME
+    assert compare(before, after, rules=rules(bracket=4e-7)).verdict is DiffVerdict.DIFFERENT
 
 
 def test_a_run_that_knows_frames_only_agrees_with_what_lies_before_its_frame():
     for baseline, candidate in ((OLD, BASELINE), (OLD, proven(width=FRAME // 4))):
         found = compare(baseline, candidate)
-        assert found.verdict is Verdict.SAME and found.signals == ()
+        assert found.verdict is DiffVerdict.SAME and found.signals == ()
         assert [change for change in found.provenance if change.name == "/collision"] == [
             dataclasses.replace(found.provenance[-1], candidate="between, clearance_bound (4 signals)")
         ]
@@ -128,7 +128,7 @@ def test_a_contact_that_no_frame_shows_is_a_difference_between_runs_that_look():
         ("contact begins", Fate.APPEARED, unseen[0][0] / 1e9),
         ("contact ends", Fate.APPEARED, unseen[1][0] / 1e9),
     ]
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     names = {item.signal.full_name for item in compare(BASELINE, other).signals}
     assert names == {SIGNAL, f"/collision/between/{PAIR}"}
     shifted = proven([(BEGIN, True), (END, False), *((moment + 3000, begins) for moment, begins in unseen)])
@@ -142,15 +142,15 @@ def test_a_contact_that_no_frame_shows_is_a_difference_between_runs_that_look():
 def test_what_an_older_run_could_not_see_is_added_and_does_not_decide():
     unseen = [(int(OLD.time[80]) - 9_000_000, True), (int(OLD.time[80]) - 6_000_000, False)]
     found = compare(OLD, proven([(BEGIN, True), (END, False), *unseen]))
-    assert found.verdict is Verdict.SAME and found.signals == ()
+    assert found.verdict is DiffVerdict.SAME and found.signals == ()
     assert found.provenance[-1].candidate == "between, clearance_bound (4 signals); 1 contact between two frames"
 
 
 def test_a_run_that_no_longer_looks_lacks_it_once():
     found = compare(BASELINE, OLD)
-    assert found.verdict is Verdict.DIFFERENT and found.signals == ()
+    assert found.verdict is DiffVerdict.DIFFERENT and found.signals == ()
     assert [(item.label, len(item.signals)) for item in found.missing] == [("/collision between, clearance_bound", 4)]
-    assert compare(BASELINE, OLD, rules=rules()).verdict is Verdict.SAME
+    assert compare(BASELINE, OLD, rules=rules()).verdict is DiffVerdict.SAME
 
 
 def test_a_run_that_does_not_look_by_its_model_is_as_one_of_before():
@@ -162,10 +162,10 @@ def test_a_run_that_does_not_look_by_its_model_is_as_one_of_before():
             clearance_bound=np.full(OLD.collision.level.shape, np.nan),
         ),
     )
-    assert compare(sampled, BASELINE).verdict is Verdict.SAME
+    assert compare(sampled, BASELINE).verdict is DiffVerdict.SAME
     assert [item.label for item in compare(BASELINE, sampled).missing] == ["/collision between, clearance_bound"]
     found = compare(sampled, sampled)
-    assert found.verdict is Verdict.SAME and found.compared == compare(OLD, OLD).compared + 4
+    assert found.verdict is DiffVerdict.SAME and found.compared == compare(OLD, OLD).compared + 4
 
 
 def test_what_a_run_says_of_moments_counts_only_where_its_columns_agree():

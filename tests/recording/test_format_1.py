@@ -15,7 +15,7 @@ import pytest
 import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.recording.export import tables
 from replay.recording.reader import read
 from replay.recording.summary import summarize
@@ -59,7 +59,7 @@ def test_written_anew_it_says_that_nobody_looked_between_its_frames(tmp_path: Pa
 
 
 def test_it_is_the_same_as_itself_and_as_a_run_of_today(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert replay.diff(OLD, OLD).verdict is Verdict.SAME
+    assert replay.diff(OLD, OLD).verdict is DiffVerdict.SAME
     assert run(["run", str(OLD), "-o", str(tmp_path), "--no-rrd"]) is ExitCode.FINE
     new = tmp_path / "pass" / "pass.mcap"
     capsys.readouterr()
@@ -69,7 +69,7 @@ def test_it_is_the_same_as_itself_and_as_a_run_of_today(tmp_path: Path, capsys: 
     assert told.count("/collision: - -> between, clearance_bound (4 signals)") == 1
     assert "/schemas/collision" not in told
     back = replay.diff(new, OLD, rules=RULES)
-    assert back.verdict is Verdict.DIFFERENT
+    assert back.verdict is DiffVerdict.DIFFERENT
     assert [(item.topic, item.name, len(item.signals)) for item in back.missing] == [
         ("/collision", "between, clearance_bound", 4)
     ]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from replay.collision.columns import Between, CollisionColumns, Crossings, Level
+from replay.scenario.expectation_check import ExpectationCheck
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_sources
 from replay.scenario.meetings import shown
 from replay.scenario.unseen import Unseen
-from replay.scenario.verdict import ExpectationCheck
 
 PAIRS = ("cube/a|plate/b", "cube/a|post/c")
 LAYOUT = Layout(links=("cube", "plate", "post"), pairs=PAIRS)

@@ -9,8 +9,7 @@ import numpy as np
 
 from replay.numerics import transforms
 from replay.sensing.capacitive.columns import CapacitiveColumns
-from replay.sensing.capacitive.part import CapacitiveExpectation, CapacitiveMethod
-from replay.sensing.capacitive.part import CapacitiveSensor as Written
+from replay.sensing.capacitive.part import CapacitiveExpectation, CapacitiveMethod, CapacitiveSensorPart
 from replay.sensing.kind import Drawing, Expected, SensorKind
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ class Capacitive(SensorKind):
     """Reads the capacitance between plates and what is around them, through a voltage divider."""
 
     name = "capacitive"
-    part = Written
+    part = CapacitiveSensorPart
     method = CapacitiveMethod
     revisions: ClassVar = {"tree": 5, "exact": 4, "midpoint": 3}
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
@@ -41,7 +40,9 @@ class Capacitive(SensorKind):
 
         return suite
 
-    def sensor(self, name: str, part: Written, link: int, ignored_links: frozenset[int]) -> CapacitiveSensor:
+    def sensor(
+        self, name: str, part: CapacitiveSensorPart, link: int, ignored_links: frozenset[int]
+    ) -> CapacitiveSensor:
         """See `SensorKind`."""
         from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
 
@@ -61,6 +62,6 @@ class Capacitive(SensorKind):
         outlines = [four[[0, 1, 2, 3, 0]] for four in corners.values()]
         return Drawing(_COLOR, 1.0, outlines, np.concatenate(list(corners.values())), corners)
 
-    def cost(self, part: Written, triangles: int) -> float:
+    def cost(self, part: CapacitiveSensorPart, triangles: int) -> float:
         """See `SensorKind`."""
         return 5.0 * len(part.plates) * math.sqrt(triangles)

@@ -16,7 +16,7 @@ VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
 
 
-class Plate(Part):
+class PlatePart(Part):
     """A rectangular plate, in the xy plane of its pose, centred at the origin; its front faces +z."""
 
     pose: Pose = Pose()
@@ -25,12 +25,12 @@ class Plate(Part):
     """Edge lengths along x and y [m]."""
 
 
-class CapacitiveSensor(Part):
+class CapacitiveSensorPart(Part):
     """Reads the capacitance between its plates and everything it senses, through a voltage divider."""
 
     link: Name
     """The link that carries the plates."""
-    plates: Annotated[dict[Name, Plate], Field(min_length=1)]
+    plates: Annotated[dict[Name, PlatePart], Field(min_length=1)]
     """Plates by name; their capacitances add up."""
     coupling: Capacitance
     """Coupling capacitance of the voltage divider [F]."""

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from replay.collision.columns import CollisionColumns, Level
 from replay.language.fields import Part
 from replay.language.node import Place
+from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import Between, PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.meetings import Clearances, Meetings, Seen, seen
 from replay.scenario.names import matches
-from replay.scenario.source import Provenance
-from replay.scenario.tallies import Count, Extremes, Tally, Times, Values
+from replay.scenario.source import ScenarioProvenance
+from replay.scenario.tallies import Count, Extremes, Tally
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
 
@@ -75,12 +76,12 @@ class ExpectationCheck:
         *,
         clearance: str = "near",
         margin: float = math.inf,
-        provenance: Provenance | None = None,
+        provenance: ScenarioProvenance | None = None,
     ) -> None:
         self._layout = layout
         self._clearance = clearance
         self._margin = margin
-        self._provenance = provenance or Provenance()
+        self._provenance = provenance or ScenarioProvenance()
         self._checks: list[_Check] = []
         for index, expectation in enumerate(expectations):
             if isinstance(expectation, PairExpectation):
@@ -91,7 +92,7 @@ class ExpectationCheck:
                     for expected in kind.expected:
                         self._add_reading(("expect", index), kind.name, expectation, expected)
 
-    def update(self, time_ns: Times, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
+    def update(self, time_ns: Integers, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
         """Take the results of the next n frames, at times (n,) [ns]: of pairs, and of each kind of sensor by name."""
         block = _Block(collision, readings)
         for check in self._checks:
@@ -133,7 +134,7 @@ class ExpectationCheck:
         if expected.clearance is not None:
             least = expected.clearance.min
 
-            def clearance(block: _Block) -> tuple[Values, Values, Seen]:
+            def clearance(block: _Block) -> tuple[Floats, Floats, Seen]:
                 assert block.collision is not None
                 part = block.collision.clearance[:, columns]
                 known = block.collision.evaluated[:, columns]
@@ -158,7 +159,7 @@ class ExpectationCheck:
         asked = getattr(written, expected.what) if expected.inside else written
         here = (*path, expected.what) if expected.inside else path
 
-        def take(block: _Block) -> Values:
+        def take(block: _Block) -> Floats:
             return expected.values(block.readings[kind])[:, column].astype(np.float64)
 
         def add(text: str, where: tuple[str | int, ...], state: Tally) -> None:
