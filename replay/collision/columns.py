@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import InitVar, dataclass, fields, replace
 from typing import Annotated
 
+import numpy as np
+
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.columns import Columns, Field
 
