@@ -24,7 +24,7 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
 
     if deep:
         from replay.scenario.scene import build
-        from replay.simulation import touching
+        from replay.simulation import touching_first
     chosen = select(load_all(scenarios), patterns)
     note_left_out(scenarios)
     if not chosen:
@@ -45,9 +45,9 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
                 problems.extend(error.problems)
                 continue
             counts |= scene.counts
+            shown.extend(remark for remark in scene.notes if remark not in kept)
             kept = list(scene.notes)
-            shown.extend(kept[len(remarks) :])
-            met = touching(scene)
+            met = touching_first(scene)
             touched |= dict.fromkeys([met] if met else [])
         kinds = ((n, what.removesuffix("s").replace("_", " ")) for what, n in counts.items())
         lines.append(", ".join([f"{scenario.name}: valid", *(count(n, kind) for n, kind in kinds)]))

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from replay import limits
-from replay.collision.columns import Level
 from replay.errors import RobotError, ScenarioError
 from replay.kinematics.linkage import Linkage
 from replay.numerics.arrays import Floats
@@ -22,7 +21,6 @@ from replay.scenario.model import Scenario
 from replay.scenario.source import resolve_name
 
 _SEED = 1
-_BLOCK = 256
 _DEEP = "in/" * 60
 """Folders around the scenario in memory, so that a part may name files far above it."""
 
@@ -86,38 +84,27 @@ def needless_pairs(scenario: Scenario, part: RobotPart, samples: int) -> Iterato
         ScenarioError: a mesh cannot be used.
     """
     from replay.scenario.scene import build
-    from replay.simulation import Simulation
+    from replay.simulation import touching
 
     scene = build(scenario)
-    simulation = Simulation(scene)
-    touching: Counter[tuple[str, str]] = Counter()
-    pairs = [_links_of(name) for name in scene.layout.pairs]
-    if simulation.collision is None:
-        return
-    machine = scene.linkage
-    positions = random_positions(machine, samples)
-    for first in range(0, samples, _BLOCK):
-        chosen = positions[first : first + _BLOCK]
-        free = np.broadcast_to(np.eye(4), (len(chosen), len(machine.free_names), 4, 4)).copy()
-        columns = simulation.collision.run(machine.forward(chosen, free))
-        met = columns.level == Level.CONTACT
-        for pair in dict.fromkeys(pairs):
-            of_links = [k for k, name in enumerate(pairs) if name == pair]
-            touching[pair] += int(np.count_nonzero(met[:, of_links].any(axis=1)))
+    columns: dict[tuple[str, str], list[int]] = {}
+    for column, name in enumerate(scene.layout.pairs):
+        a, b = sorted(side.partition("/")[0] for side in name.split("|"))
+        columns.setdefault((a, b), []).append(column)
+    machine, times_of = scene.linkage, Counter[tuple[str, str]]()
+    free = np.broadcast_to(np.eye(4), (samples, len(machine.free_names), 4, 4))
+    for flags in touching(scene, random_positions(machine, samples), free):
+        for pair, of_links in columns.items():
+            times_of[pair] += int(np.count_nonzero(flags[:, of_links].any(axis=1)))
     near = _neighbours(part)
-    for pair in dict.fromkeys(pairs):
-        times = touching[pair]
+    for pair in columns:
+        times = times_of[pair]
         if times == 0:
             yield *pair, f"never in contact in {samples} random poses"
         elif frozenset(pair) in near:
             yield *pair, f"adjacent, in contact in {times} of {samples} random poses"
         elif times == samples:
             yield *pair, f"always in contact in {samples} random poses"
-
-
-def _links_of(pair: str) -> tuple[str, str]:
-    a, b = sorted(side.partition("/")[0] for side in pair.split("|"))
-    return a, b
 
 
 def random_positions(machine: Linkage, samples: int) -> Floats:
