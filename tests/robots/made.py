@@ -10,8 +10,8 @@ BODIES = (
 )
 
 
-def urdf(seed, links=12, mimics=4):
-    """Return the text of a random robot; joints that follow do so in chains."""
+def urdf(seed, links=12, mimics=4, far=0.5):
+    """Return the text of a random robot, its joints up to `far` m apart; joints that follow do so in chains."""
     random = np.random.default_rng(seed)
 
     def numbers(count, low, high):
@@ -34,7 +34,7 @@ def urdf(seed, links=12, mimics=4):
         if kind != "fixed":
             movable.append(f"j{k}")
         lines.append(
-            f'<joint name="j{k}" type="{kind}"><origin xyz="{numbers(3, -0.5, 0.5)}" rpy="{numbers(3, -3, 3)}"/>'
+            f'<joint name="j{k}" type="{kind}"><origin xyz="{numbers(3, -far, far)}" rpy="{numbers(3, -3, 3)}"/>'
             f'<parent link="l{random.integers(k)}"/><child link="l{k}"/><axis xyz="{numbers(3, -1, 1)}"/>'
             f"{limit}{mimic}</joint>"
         )
