@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
 from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place
@@ -15,6 +13,7 @@ from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes
 from replay.sensing.capacitive.tree.clusters import Clusters
 from replay.sensing.capacitive.tree.parts import Room, doubt_and_least, pop, push
 from replay.sensing.capacitive.tree.registers import (
+    ABOVE,
     ALLOWED,
     AREA,
     BEGIN,
@@ -29,21 +28,26 @@ from replay.sensing.capacitive.tree.registers import (
     KEEP,
     LANES,
     LEAST,
+    LINE,
     MEAN2,
+    MOMENT_COLUMNS,
     PART,
     POINTS_1,
     RULE,
     RULE_FOUND,
     SECOND_CHILD,
+    SECOND_OF_SECOND,
     VERDICT,
 )
 from replay.sensing.capacitive.tree.triangle_bounds import judge_triangles
 
-Floats = NDArray[np.float64]
-
 _EFFORT_RULE = 0.5
 """What it costs to take a triangle's next rule, against opening a node."""
 
+
+_TWO_LEVELS = 16.0
+"""A node whose error is so many times what is allowed is opened two levels at once: an error falls by a factor of 2 to
+11 from a node to its children."""
 
 _FIRST_PARTS = 100.0
 """A part with more than this fraction of the whole error is opened before the errors are compared."""
@@ -166,10 +170,14 @@ def _settle_nodes(
                 keep = side == KEEP
             if keep:
                 push(room.queue, node, CLUSTER, lanes, i, error * scale)
+                for line in range(0, MOMENT_COLUMNS, LINE):
+                    prefetch(clusters.moments, node, line)
                 least += lanes[(FOUND + LEAST) * LANES + i]
                 doubt += error
             else:
-                size, waiting = _put_parts(clusters, room, node, size, waiting)
+                # far too much of an error is too much for children, too
+                far_off = verdict == 0.0 or error > _TWO_LEVELS * limit
+                size, waiting = _put_parts(clusters, room, node, far_off, size, waiting)
     return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
@@ -226,27 +234,44 @@ def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally)
         opened += error
         limit = min(limit, error)
         if rule == CLUSTER:
-            size, waiting = _put_parts(clusters, room, part, size, waiting)
+            size, waiting = _put_parts(clusters, room, part, False, size, waiting)
         else:
-            tasks[waiting], firsts[waiting] = part, rule + 1
+            tasks[waiting], firsts[waiting] = part, (rule - ABOVE if rule >= ABOVE else rule) + 1
             waiting += 1
     return size, waiting, limit, SumTally(tally.done, tally.spent, least, doubt)
 
 
 @inlined_kernel
-def _put_parts(clusters: Clusters, room: Room, node: int, size: int, waiting: int) -> tuple[int, int]:
-    """Put a node's children on the stack, or a leaf's triangles on the list of tasks; return the new sizes."""
-    links, outlines, triangles = clusters.links, clusters.outlines, clusters.triangles
-    stack, tasks, firsts = room.stack, room.tasks, room.firsts
-    second = links[node, SECOND_CHILD]
+def _put_parts(
+    clusters: Clusters, room: Room, node: int, grandchildren: bool, size: int, waiting: int
+) -> tuple[int, int]:
+    """Put a node's children on the stack, or these' children, or a leaf's triangles on the list of tasks.
+
+    Returns the new sizes.
+    """
+    links, triangles = clusters.links, clusters.triangles
+    tasks, firsts = room.tasks, room.firsts
+    first, second = node + 1, links[node, SECOND_CHILD]
     if second >= 0:
-        stack[size], stack[size + 1] = second, node + 1
-        prefetch(outlines, second, 0)
-        prefetch(links, second, 0)
-        return size + 2, waiting
+        of_second = links[node, SECOND_OF_SECOND]
+        if grandchildren and of_second >= 0 and links[first, SECOND_CHILD] >= 0:
+            size = _put_node(clusters, room, second + 1, size)
+            size = _put_node(clusters, room, of_second, size)
+            size = _put_node(clusters, room, first + 1, size)
+            return _put_node(clusters, room, links[first, SECOND_CHILD], size), waiting
+        size = _put_node(clusters, room, second, size)
+        return _put_node(clusters, room, first, size), waiting
     for k in range(links[node, BEGIN], links[node, END]):
         tasks[waiting], firsts[waiting] = k, POINTS_1
         prefetch(triangles, k, 0)
         prefetch(triangles, k, 8)
         waiting += 1
     return size, waiting
+
+
+@inlined_kernel
+def _put_node(clusters: Clusters, room: Room, node: int, size: int) -> int:
+    room.stack[size] = node
+    prefetch(clusters.outlines, node, 0)
+    prefetch(clusters.links, node, 0)
+    return size + 1

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, kernel
 from replay.sensing.capacitive.tree.registers import (
     COLUMNS,
@@ -28,9 +28,6 @@ from replay.sensing.capacitive.tree.registers import (
     VALUES,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _NONE = -1
 _USED, _HIGHEST, _UNUSED = range(3)
 BUCKETS = 256
@@ -45,9 +42,9 @@ class Queue(NamedTuple):
     """Room for the parts of one sum."""
 
     values: Floats  # (capacity, 4) ERROR, SHIFT, LEAST and REGION, see `lanes`
-    labels: Ints  # (capacity, 3) PART, RULE and NEXT
-    heads: Ints  # (256,) first slot of each bucket, or -1
-    state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
+    labels: Integers  # (capacity, 3) PART, RULE and NEXT
+    heads: Integers  # (256,) first slot of each bucket, or -1
+    state: Integers  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
 
 
 @kernel
@@ -125,12 +122,12 @@ class Room(NamedTuple):
     """Memory for the sum over n triangles."""
 
     queue: Queue
-    stack: Ints  # (n + LANES,) nodes to judge
-    tasks: Ints  # (n,) triangles to judge
-    firsts: Ints  # (n,) the first rule to try on each
-    hard: Ints  # (n,) triangles without a rule
-    lists: Ints  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
-    batch: Ints  # (LANES,) what the lanes are about
+    stack: Integers  # (n + LANES,) nodes to judge
+    tasks: Integers  # (n,) triangles to judge
+    firsts: Integers  # (n,) the first rule to try on each
+    hard: Integers  # (n,) triangles without a rule
+    lists: Integers  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
+    batch: Integers  # (LANES,) what the lanes are about
     lanes: Floats  # (COLUMNS x LANES,)
 
 

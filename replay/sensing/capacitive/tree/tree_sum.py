@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 from numba import boolean, float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.sensing.capacitive.contact import SATURATED, contact, may_touch
@@ -31,10 +31,6 @@ from replay.sensing.capacitive.tree.parts import Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
 from replay.sensing.capacitive.tree.triangle_pieces import Pieces, new_pieces
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 COUNTS = 4
 NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 """Rows of the counters: tree nodes judged, those summed by their moments, triangles in these, and triangles summed one
@@ -51,7 +47,7 @@ def sum_tree(
     both: bool,
     facing: bool,
     rtol: float,
-    counts: Ints,
+    counts: Integers,
 ) -> tuple[Floats, Flags, Floats]:
     """Return what `sum_triangles` returns, to a relative tolerance, and the rigorous bound of the error.
 
@@ -83,7 +79,7 @@ def sum_tree(
 
 @kernel
 def _sum_one(
-    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Ints
+    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Integers
 ) -> tuple[float, bool, float]:
     """Return the integral over a body [m], whether it touches the plate, and the bound of the error [m]."""
     triangles = clusters.triangles
@@ -128,7 +124,7 @@ def _sum_one(
 
 
 @leaf_kernel
-def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
+def _add_counts(counts: Integers, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
     counts[NODES] += nodes
     counts[CLUSTERS] += clusters
     counts[IN_CLUSTERS] += in_clusters
@@ -136,7 +132,7 @@ def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone
 
 
 @leaf_kernel
-def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -> int:
+def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Integers, found: Integers) -> int:
     """Write the triangles that may saturate to `found`; return how many. Only nodes that reach the plate are opened."""
     T, half_x, half_y = plate.T_plate_body, plate.half_x, plate.half_y
     nodes, links, triangles = clusters.nodes, clusters.links, clusters.triangles
@@ -163,7 +159,7 @@ def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) 
 
 
 @kernel
-def _any_saturates(triangles: Floats, which: Ints, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
+def _any_saturates(triangles: Floats, which: Integers, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
     """Return whether one of the rows which[:count] of `triangles` makes the integral infinite.
 
     `triangle` (3, 3) is scratch memory.
