@@ -19,7 +19,6 @@ from replay.sensing.capacitive.tree.registers import (
     BEGIN,
     CENTROID,
     CLUSTER,
-    DROP,
     END,
     ERROR,
     FIRST_RULE,
@@ -31,6 +30,7 @@ from replay.sensing.capacitive.tree.registers import (
     LINE,
     MEAN2,
     MOMENT_COLUMNS,
+    OPEN,
     PART,
     POINTS_1,
     RULE,
@@ -49,8 +49,9 @@ _TWO_LEVELS = 16.0
 """A node whose error is so many times what is allowed is opened two levels at once: an error falls by a factor of 2 to
 11 from a node to its children."""
 
-_FIRST_PARTS = 100.0
-"""A part with more than this fraction of the whole error is opened before the errors are compared."""
+_FIRST_PARTS = 32.0
+"""Before errors are compared, a part is opened that has more than this fraction of the whole error, times the eighth
+root of rtol: the smaller that is, the more parts share the error."""
 
 
 class Budget(NamedTuple):
@@ -87,7 +88,8 @@ class SumTally(NamedTuple):
 def budget_of(nodes: Floats, plate: PlacedPlate, rtol: float) -> Budget:
     """Return the budget of a sum over all of a body's `Clusters.nodes`."""
     ceiling = rtol * _least_of_root(nodes, plate)
-    return Budget(rtol, ceiling / _FIRST_PARTS, 1.0 / ceiling if ceiling > 0.0 else 1.0)
+    root = math.sqrt(math.sqrt(math.sqrt(rtol)))
+    return Budget(rtol, ceiling * root / _FIRST_PARTS, 1.0 / ceiling if ceiling > 0.0 else 1.0)
 
 
 @inlined_kernel
@@ -150,6 +152,7 @@ def _settle_nodes(
     Returns how many triangles wait to be judged, how many nodes were judged, and the tally.
     """
     stack, batch, lanes = room.stack, room.batch, room.lanes
+    keepers, openers = room.keepers, room.openers
     judged, least, doubt = 0, tally.least, tally.doubt
     while size > 0:
         count = min(size, LANES)
@@ -158,26 +161,33 @@ def _settle_nodes(
         for i in range(count):
             batch[i] = stack[size + i]
         judge_nodes(clusters.outlines, batch, count, plate, lanes)
+        # told apart without branches, which no processor could foresee
+        kept, opened = 0, 0
         for i in range(count):
-            node, verdict, error = batch[i], lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
-            if verdict < 0.0:
+            verdict = lanes[VERDICT * LANES + i]
+            keep = (verdict > 0.0) & (lanes[(FOUND + ERROR) * LANES + i] <= limit)
+            keepers[kept], openers[opened] = i, i
+            kept += keep
+            opened += (verdict >= 0.0) & (not keep)
+        for k in range(kept):
+            i = keepers[k]
+            node, error = batch[i], lanes[(FOUND + ERROR) * LANES + i]
+            side = faces(clusters.nodes, node, plate.centre) if plate.facing else KEEP
+            if side == OPEN:
+                openers[opened] = i
+                opened += 1
+            if side != KEEP:
                 continue
-            keep = (verdict > 0.0) & (error <= limit)
-            if keep and plate.facing:
-                side = faces(clusters.nodes, node, plate.centre)
-                if side == DROP:
-                    continue
-                keep = side == KEEP
-            if keep:
-                push(room.queue, node, CLUSTER, lanes, i, error * scale)
-                for line in range(0, MOMENT_COLUMNS, LINE):
-                    prefetch(clusters.moments, node, line)
-                least += lanes[(FOUND + LEAST) * LANES + i]
-                doubt += error
-            else:
-                # far too much of an error is too much for children, too
-                far_off = verdict == 0.0 or error > _TWO_LEVELS * limit
-                size, waiting = _put_parts(clusters, room, node, far_off, size, waiting)
+            push(room.queue, node, CLUSTER, lanes, i, error * scale)
+            for line in range(0, MOMENT_COLUMNS, LINE):
+                prefetch(clusters.moments, node, line)
+            least += lanes[(FOUND + LEAST) * LANES + i]
+            doubt += error
+        for k in range(opened):
+            i = openers[k]
+            # far too much of an error is too much for children, too
+            far_off = (lanes[VERDICT * LANES + i] == 0.0) | (lanes[(FOUND + ERROR) * LANES + i] > _TWO_LEVELS * limit)
+            size, waiting = _put_parts(clusters, room, batch[i], far_off, size, waiting)
     return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
@@ -191,11 +201,15 @@ def _settle_triangles(
     """
     tasks, firsts, batch, lanes = room.tasks, room.firsts, room.batch, room.lanes
     hard, in_hard, least, doubt = 0, 0.0, tally.least, tally.doubt
-    for begin in range(0, waiting, LANES):
-        count = min(waiting - begin, LANES)
-        for i in range(count):
-            batch[i] = tasks[begin + i]
-            lanes[FIRST_RULE * LANES + i], lanes[ALLOWED * LANES + i] = firsts[begin + i], allowed
+    begin = 0
+    while begin < waiting:
+        count = 0
+        while count < LANES and begin < waiting:
+            batch[count] = tasks[begin]
+            lanes[FIRST_RULE * LANES + count], lanes[ALLOWED * LANES + count] = firsts[begin], allowed
+            # what is behind the plate is left out here, again without branches
+            count += plate.both | (_highest(triangles, batch[count], plate) >= -plate.rounding)
+            begin += 1
         judge_triangles(triangles, batch, count, plate, lanes)
         for i in range(count):
             verdict, error = lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
@@ -210,6 +224,17 @@ def _settle_triangles(
                 # one that does not face the plate may be among them
                 in_hard += 0.0 if plate.facing else lanes[(FOUND + LEAST) * LANES + i]
     return hard, in_hard, SumTally(tally.done, tally.spent, least, doubt)
+
+
+@inlined_kernel
+def _highest(triangles: Floats, k: int, plate: PlacedPlate) -> float:
+    """Return the largest z of a triangle's corners in the plate's frame [m]."""
+    T = plate.T_plate_body
+    return max(  # type: ignore[no-any-return]
+        place(T, triangles[k, 0], triangles[k, 1], triangles[k, 2])[2],
+        place(T, triangles[k, 3], triangles[k, 4], triangles[k, 5])[2],
+        place(T, triangles[k, 6], triangles[k, 7], triangles[k, 8])[2],
+    )
 
 
 @inlined_kernel

@@ -128,6 +128,8 @@ class Room(NamedTuple):
     hard: Integers  # (n,) triangles without a rule
     lists: Integers  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
     batch: Integers  # (LANES,) what the lanes are about
+    keepers: Integers  # (LANES,) lanes of nodes that become parts
+    openers: Integers  # (LANES,) lanes of nodes to open
     lanes: Floats  # (COLUMNS x LANES,)
 
 
@@ -141,6 +143,8 @@ def new_room(n: int) -> Room:
         np.empty(n, np.int64),
         np.empty(n, np.int64),
         np.empty((RULES + 1, max(n, RULES)), np.int64),
+        np.empty(LANES, np.int64),
+        np.empty(LANES, np.int64),
         np.empty(LANES, np.int64),
         np.zeros(COLUMNS * LANES),
     )

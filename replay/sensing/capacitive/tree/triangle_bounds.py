@@ -122,21 +122,24 @@ def rule_error(rule: int, area: float, spread: float, h: float, inverses: tuple[
 
 @inlined_kernel
 def cheapest_rule(
-    first: int, area: float, spread: float, h: float, inverses: tuple[float, float], doubt: float, allowed: float
-) -> tuple[int, float]:
-    """Return the cheapest rule, from `first` on, whose error is allowed, and that error; or NO_RULE and inf."""
-    rule, error = NO_RULE, math.inf
+    first: float, area: float, spread: float, h: float, inverses: tuple[float, float], doubt: float, allowed: float
+) -> tuple[float, float]:
+    """Return the cheapest rule, from `first` on, whose error is allowed, and that error; or NO_RULE and inf.
+
+    Rules are floats here, as lanes are.
+    """
+    rule, error = float(NO_RULE), math.inf
     # no early return: this is for lanes, too
     for candidate in (POINTS_16, POINTS_7, POINTS_3, POINTS_1):
         bound = rule_error(candidate, area, spread, h, inverses, doubt)
         good = candidate >= first and bound <= allowed
-        rule, error = candidate if good else rule, bound if good else error
+        rule, error = float(candidate) if good else rule, bound if good else error
     return rule, error
 
 
 @inlined_kernel
 def cheapest_rule_above(
-    first: int,
+    first: float,
     area: float,
     spread: float,
     h: float,
@@ -145,20 +148,20 @@ def cheapest_rule_above(
     wrong: float,
     several: bool,
     allowed: float,
-) -> tuple[int, float]:
+) -> tuple[float, float]:
     """Return what `cheapest_rule` does, for the part above z = 0: the small triangle that it cuts off, or all but that.
 
     By one point the part is taken as a whole, with the error bound `wrong` [m]. By more points, if `several`, the small
     triangle is summed, and the large one if that part is below, each with the rule's error.
     """
-    rule, error = NO_RULE, math.inf
+    rule, error = float(NO_RULE), math.inf
     for candidate in (POINTS_16, POINTS_7, POINTS_3):
         bound = rule_error(candidate, area, spread, h, inverses, 0.0)
         bound += rule_error(candidate, area, spread, 4.0 * _THIRD * h, inverses_of_small, 0.0)
         good = several and candidate >= first and bound <= allowed
-        rule, error = candidate if good else rule, bound if good else error
+        rule, error = float(candidate) if good else rule, bound if good else error
     good = first == POINTS_1 and wrong <= allowed
-    return POINTS_1 if good else rule, wrong if good else error
+    return float(POINTS_1) if good else rule, wrong if good else error
 
 
 @inlined_kernel
