@@ -5,7 +5,7 @@ import pytest
 
 from replay.errors import InvalidValue
 from replay.geometry.primitives import cuboid, sphere
-from replay.kinematics.linkage import Joint, JointType, Link, Linkage
+from replay.kinematics.linkage import POSE_ROUNDING, Joint, JointType, Link, Linkage
 from replay.numerics import transforms
 from replay.sensing.capacitive import CapacitiveSensor, CapacitiveSuite, Plate, output_voltage, plate_integral
 from replay.sensing.target import make_target
@@ -188,6 +188,38 @@ def test_a_wall_that_a_plate_abuts_on_up_to_rounding_saturates_it(method):
         suite = CapacitiveSuite([sensor], [make_target("wall/skin", 2, wall)], method=method)
         columns = suite.run(linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4))))
         assert columns.saturated.all() and columns.touching.all()
+
+
+@pytest.mark.parametrize("method", ["tree", "exact", "midpoint"])
+def test_a_body_that_does_not_touch_leaves_the_touch_of_another(method):
+    linkage = _linkage()
+    guard, body, other = (linkage.link_index(name) for name in ("guard", "body", "other"))
+    sensor = CapacitiveSensor("s", guard, (Plate("p", transforms.identity(), np.array([0.05, 0.03])),), coupling=1e-12)
+    tip = np.array([[[0.0, 0.0, 0.0], [-0.02, 0.0, 0.05], [0.02, 0.01, 0.05]]])
+    near, away = make_target("body/tip", body, tip), make_target("other/box", other, cuboid((0.2, 0.3, 0.4)).triangles)
+    for targets in ([near, away], [away, near], [near, near], [away]):
+        suite = CapacitiveSuite([sensor], targets, method=method, splits=1)
+        columns = suite.run(_poses(linkage, [0.01, 0.0, 0.02]))
+        assert columns.touching[:, 0].tolist() == [False, near in targets, False]
+
+
+def test_rounding_counts_the_way_the_plate_s_place_and_the_body_s_size():
+    linkage, targets, _ = _scene()
+
+    def rounding(*places, way=0.0, size=1.0):
+        plates = tuple(
+            Plate(f"p{k}", transforms.from_translation(np.array(place)), np.array([0.1, 0.1]))
+            for k, place in enumerate(places)
+        )
+        sensor = CapacitiveSensor("s", linkage.link_index("guard"), plates, coupling=1e-12)
+        body = make_target("body/box", targets[0].link, cuboid((size, 0.5, 0.25)).triangles)
+        return CapacitiveSuite([sensor], [body])._rounding(0, 0, np.array([way, 2.0 * way])) / POSE_ROUNDING
+
+    assert rounding([0.0, 0.0, 0.0]).tolist() == [0.5, 0.5]
+    assert rounding([3.0, -4.0, 1.0]).tolist() == [8.5, 8.5]
+    assert rounding([3.0, -4.0, 1.0], [0.0, 20.0, 0.0], [1.0, 0.0, 0.0]).tolist() == [20.5, 20.5]
+    assert rounding([3.0, -4.0, 1.0], way=16.0).tolist() == [24.5, 40.5]
+    assert rounding([3.0, -4.0, 1.0], way=16.0, size=64.0).tolist() == [56.0, 72.0]
 
 
 def test_a_machine_far_from_the_origin_reads_the_same():

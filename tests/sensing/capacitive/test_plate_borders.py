@@ -12,6 +12,7 @@ from replay.sensing.capacitive import exact, plate_integral
 from replay.sensing.capacitive.area_share import share
 from replay.sensing.capacitive.tree.clusters import make_clusters
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
+from tests.amounts import cases
 from tests.sensing.capacitive import plate_reference
 
 _HALVES = [(1.0, 1.0), (1.0, 3.0), (0.25, 0.5), (0.3, 0.7)]
@@ -75,7 +76,7 @@ def test_the_areas_of_the_pieces_add_up_to_the_triangle():
     rng = np.random.default_rng(4)
     scratch = np.empty(exact.SCRATCH)
     triangles = [*_in_borders(), *_in_plate_plane()]
-    for lattice in range(300):
+    for lattice in range(cases(300)):
         half = _HALVES[lattice % len(_HALVES)]
         corners = rng.choice([-2.0, -1.0, 0.0, 1.0, 2.0], (3, 2)) * half
         triangles.append((np.column_stack([corners, rng.choice([0.0, 0.5, 1.0], 3)]), half))

@@ -1,5 +1,6 @@
 """The plate integral: high-precision references, invariances, continuity, contact, convergence."""
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 
 from replay.errors import InvalidValue
 from replay.sensing.capacitive import plate_integral
+from replay.sensing.capacitive.contact import CLEAR, SATURATED, TOUCHING, contact
+from tests.amounts import cases
 from tests.sensing.capacitive import plate_cases, plate_reference
 
 _HARD_CASES = Path(__file__).parents[2] / "data" / "plate_integral.json"
@@ -150,6 +153,20 @@ def test_the_integral_is_infinite_exactly_when_more_than_one_point_is_shared(nam
                 assert value >= 0.0
 
 
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_a_triangle_around_the_plate_saturates_it_in_either_winding(order):
+    # no edge of it runs through the plate: only the turn about the plate's centre tells
+    for corners in ([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[-5, -3, 0], [4, -4, 0], [1, 7, 0]]):
+        for half in ([0.05, 0.03], [1 / 3, 1e-3], [1e-4, 2.0]):
+            triangle = np.array(corners, dtype=float)[list(order)] * [*half, 1.0]
+            assert plate_integral([triangle], half, side="both")[0] == math.inf
+            assert plate_integral([triangle], half, side="front")[0] == 0.0
+            assert [contact(triangle, *half, both) for both in (True, False)] == [SATURATED, TOUCHING]
+            beside = triangle + np.array([20.0 * half[0], 0.0, 0.0])
+            assert [contact(beside, *half, both) for both in (True, False)] == [CLEAR, CLEAR]
+            assert 0.0 < plate_integral([beside], half, side="both")[0] < math.inf
+
+
 def test_finite_integrals_of_touching_triangles_have_their_closed_form():
     # a corner on the plate's edge, coplanar beside it: width w(u) = 2 u / 3, integral of w/u over 0..3 is 2
     triangle = [[0.05, 0.0, 0.0], [3.05, 1.0, 0.0], [3.05, -1.0, 0.0]]
@@ -187,6 +204,30 @@ def test_crossing_the_plate_at_its_corner_alone_is_finite(triangle, half, front,
         assert plate_integral(turned, half, side="both")[0] == pytest.approx(both, rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("triangle", "half"),
+    [
+        ([[-1.53125, 0.671875, 2.1875], [-0.015625, 0.15625, -3.390625], [0.09375, 1.390625, -1.25]], [0.75, 0.75]),
+        ([[-0.3125, 0.640625, 0.328125], [-1.15625, -0.234375, 1.984375], [0.71875, -0.25, -3.65625]], [0.25, 0.5]),
+        (
+            [
+                [1.8657951909689776, 0.9388167443879842, -4.53093533974298],
+                [-1.311194650887622, -0.9745611068913507, -0.7400993680111864],
+                [-1.5278000975253345, 1.1263059204086376, 6.2123180538019165],
+            ],
+            [1 / 3, 0.25],
+        ),
+    ],
+)
+@pytest.mark.parametrize("side", ["front", "both"])
+def test_a_crumb_that_rounding_leaves_at_the_plate_s_corner_has_no_integral(triangle, half, side):
+    # it is 1e-18 of the triangle and is cut off where the plate begins, so that its own mean is infinite
+    expected = float(plate_reference.plate_integral(triangle, half, side))
+    for order in itertools.permutations(range(3)):
+        value = plate_integral([np.array(triangle)[list(order)]], half, side=side)[0]
+        assert value == pytest.approx(expected, rel=1e-13)
+
+
 def test_corners_on_one_line_through_the_plate_have_no_integral():
     corners = [[0.041666666666666664, 0.0375, 0.0], [-0.08333333333333333, 0.15, 0.0], [0.08333333333333333, 0.0, 0.0]]
     for method in ("exact", "midpoint"):
@@ -196,7 +237,7 @@ def test_corners_on_one_line_through_the_plate_have_no_integral():
 def test_triangles_through_the_plate_s_corner_or_just_beside_it():
     rng = np.random.default_rng(8)
     one_point = 0
-    for k in range(120):
+    for k in range(cases(120)):
         half = rng.choice([0.25, 0.5, 0.75, 3.0], 2)
         signs = rng.choice([-1, 1], 2)
         corner, slope = half * signs, signs * rng.integers(1, 4, 2)

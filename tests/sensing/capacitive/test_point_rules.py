@@ -7,6 +7,7 @@ from replay.numerics.gauss import NODES_16, TRIANGLE_7, TRIANGLE_16, WEIGHTS_16
 from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.tree.registers import POINTS_1, POINTS_3, POINTS_7, POINTS_16
 from replay.sensing.capacitive.tree.triangle_bounds import part_above, rule_error
+from tests.amounts import cases
 
 _ONE = np.array([[1.0, 1.0, 1.0, 3.0]]).T / 3.0
 _THREE = np.array([[4.0, 1.0, 1.0, 2.0], [1.0, 4.0, 1.0, 2.0], [1.0, 1.0, 4.0, 2.0]]).T / 6.0
@@ -72,7 +73,7 @@ def test_a_part_above_the_plane_is_within_its_bound():
     rng = np.random.default_rng(3)
     half = 0.3
     seen = 0
-    for _ in range(400):
+    for _ in range(cases(400)):
         triangle = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.5]) + [*rng.normal(size=2) * 3.0, 0.0]
         low, high = triangle[:, 2].min(), triangle[:, 2].max()
         offsets = triangle - triangle.mean(axis=0)
