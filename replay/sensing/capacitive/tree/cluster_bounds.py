@@ -78,6 +78,25 @@ def _over_borders(
 
 
 @leaf_kernel
+def judge_sides(outlines: Singles, which: Integers, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+    """Write on which side of z = 0 the nodes which[:count] are: verdicts DROP behind, KEEP before, OPEN across it."""
+    T, blur = plate.T_plate_body, plate.blur
+    load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
+    for i in range(padded(count)):
+        a, b, c = (
+            lanes[CENTROID * LANES + i],
+            lanes[(CENTROID + 1) * LANES + i],
+            lanes[(CENTROID + 2) * LANES + i],
+        )
+        z = place(T, a, b, c)[2]
+        middle = (lanes[MIDDLE * LANES + i], lanes[(MIDDLE + 1) * LANES + i], lanes[(MIDDLE + 2) * LANES + i])
+        half = (lanes[HALF * LANES + i], lanes[(HALF + 1) * LANES + i], lanes[(HALF + 2) * LANES + i])
+        above, below = _reaches(T[2][:3], middle, half, lanes[RADIUS * LANES + i])
+        verdict = 0.0 if z - below <= blur else 1.0
+        lanes[VERDICT * LANES + i] = -1.0 if z + above < -blur else verdict
+
+
+@leaf_kernel
 def judge_nodes(outlines: Singles, which: Integers, count: int, plate: PlacedPlate, lanes: Floats) -> None:
     """Write what is found of the nodes which[:count], and the verdict on each, to the lanes.
 

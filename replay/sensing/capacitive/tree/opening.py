@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
 from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place
-from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes
+from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes, judge_sides
 from replay.sensing.capacitive.tree.clusters import Clusters
 from replay.sensing.capacitive.tree.parts import Room, doubt_and_least, pop, push
 from replay.sensing.capacitive.tree.registers import (
@@ -108,15 +108,47 @@ def _least_of_root(nodes: Floats, plate: PlacedPlate) -> float:
 
 
 @leaf_kernel
+def split_at_plane(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[int, int, int]:
+    """Put the nodes before the plate on the stack, and the triangles of leaves across z = 0 on the list of tasks.
+
+    What is across has to be opened, whatever its error. Returns how many nodes are on the stack, how many triangles
+    wait to be judged, and how many nodes were looked at.
+    """
+    stack, across, batch, openers, lanes = room.stack, room.across, room.batch, room.openers, room.lanes
+    stack[0], across[0] = 0, 0
+    if plate.both:
+        return 1, 0, 0
+    left, size, waiting, seen = 1, 0, 0, 0
+    while left > 0:
+        count = min(left, LANES)
+        left -= count
+        seen += count
+        for i in range(count):
+            batch[i] = across[left + i]
+        judge_sides(clusters.outlines, batch, count, plate, lanes)
+        opened = 0
+        for i in range(count):
+            verdict = lanes[VERDICT * LANES + i]
+            stack[size], openers[opened] = batch[i], batch[i]
+            size += verdict > 0.0
+            opened += verdict == 0.0
+        for k in range(opened):
+            left, waiting = _put_parts(clusters, room, across, openers[k], False, left, waiting)
+    return size, waiting, seen
+
+
+@leaf_kernel
 def refine(
-    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, tally: SumTally
+    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, waiting: int, tally: SumTally
 ) -> tuple[int, float, int, SumTally]:
-    """Judge the `size` nodes on the stack, and open the worst parts until the sum is good enough or a triangle is hard.
+    """Judge the nodes on the stack and the triangles that wait, `size` and `waiting` many, and open the worst parts.
+
+    It ends when the sum is good enough or a triangle is hard.
 
     Returns how many hard triangles, those without a rule, now are in `room.hard`, 0 when the parts are good enough; a
     lower bound of what these bring [m]; how many nodes were judged; and the tally.
     """
-    waiting, judged = 0, 0
+    judged = 0
     limit = allowed = budget.first
     while True:
         waiting, opened, tally = _settle_nodes(clusters, plate, room, size, waiting, limit, budget.scale, tally)
@@ -136,7 +168,7 @@ def refine(
         allowed = 0.5 * limit
 
 
-@inlined_kernel
+@leaf_kernel
 def _settle_nodes(
     clusters: Clusters,
     plate: PlacedPlate,
@@ -187,11 +219,11 @@ def _settle_nodes(
             i = openers[k]
             # far too much of an error is too much for children, too
             far_off = (lanes[VERDICT * LANES + i] == 0.0) | (lanes[(FOUND + ERROR) * LANES + i] > _TWO_LEVELS * limit)
-            size, waiting = _put_parts(clusters, room, batch[i], far_off, size, waiting)
+            size, waiting = _put_parts(clusters, room, stack, batch[i], far_off, size, waiting)
     return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
-@inlined_kernel
+@leaf_kernel
 def _settle_triangles(
     triangles: Floats, plate: PlacedPlate, room: Room, waiting: int, allowed: float, scale: float, tally: SumTally
 ) -> tuple[int, float, SumTally]:
@@ -237,7 +269,7 @@ def _highest(triangles: Floats, k: int, plate: PlacedPlate) -> float:
     )
 
 
-@inlined_kernel
+@leaf_kernel
 def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally) -> tuple[int, int, float, SumTally]:
     """Open the worst parts, at least as much error as there is too much.
 
@@ -259,7 +291,7 @@ def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally)
         opened += error
         limit = min(limit, error)
         if rule == CLUSTER:
-            size, waiting = _put_parts(clusters, room, part, False, size, waiting)
+            size, waiting = _put_parts(clusters, room, room.stack, part, False, size, waiting)
         else:
             tasks[waiting], firsts[waiting] = part, (rule - ABOVE if rule >= ABOVE else rule) + 1
             waiting += 1
@@ -268,9 +300,9 @@ def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally)
 
 @inlined_kernel
 def _put_parts(
-    clusters: Clusters, room: Room, node: int, grandchildren: bool, size: int, waiting: int
+    clusters: Clusters, room: Room, stack: Integers, node: int, grandchildren: bool, size: int, waiting: int
 ) -> tuple[int, int]:
-    """Put a node's children on the stack, or these' children, or a leaf's triangles on the list of tasks.
+    """Put a node's children on a stack, or these' children, or a leaf's triangles on the list of tasks.
 
     Returns the new sizes.
     """
@@ -280,23 +312,23 @@ def _put_parts(
     if second >= 0:
         of_second = links[node, SECOND_OF_SECOND]
         if grandchildren and of_second >= 0 and links[first, SECOND_CHILD] >= 0:
-            size = _put_node(clusters, room, second + 1, size)
-            size = _put_node(clusters, room, of_second, size)
-            size = _put_node(clusters, room, first + 1, size)
-            return _put_node(clusters, room, links[first, SECOND_CHILD], size), waiting
-        size = _put_node(clusters, room, second, size)
-        return _put_node(clusters, room, first, size), waiting
+            size = _put_node(clusters, stack, second + 1, size)
+            size = _put_node(clusters, stack, of_second, size)
+            size = _put_node(clusters, stack, first + 1, size)
+            return _put_node(clusters, stack, links[first, SECOND_CHILD], size), waiting
+        size = _put_node(clusters, stack, second, size)
+        return _put_node(clusters, stack, first, size), waiting
     for k in range(links[node, BEGIN], links[node, END]):
         tasks[waiting], firsts[waiting] = k, POINTS_1
         prefetch(triangles, k, 0)
-        prefetch(triangles, k, 8)
+        prefetch(triangles, k, LINE)
         waiting += 1
     return size, waiting
 
 
 @inlined_kernel
-def _put_node(clusters: Clusters, room: Room, node: int, size: int) -> int:
-    room.stack[size] = node
+def _put_node(clusters: Clusters, stack: Integers, node: int, size: int) -> int:
+    stack[size] = node
     prefetch(clusters.outlines, node, 0)
     prefetch(clusters.links, node, 0)
     return size + 1

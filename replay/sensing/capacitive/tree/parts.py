@@ -123,13 +123,14 @@ class Room(NamedTuple):
 
     queue: Queue
     stack: Integers  # (n + LANES,) nodes to judge
+    across: Integers  # (n + LANES,) nodes that may be across z = 0
     tasks: Integers  # (n,) triangles to judge
     firsts: Integers  # (n,) the first rule to try on each
     hard: Integers  # (n,) triangles without a rule
     lists: Integers  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
     batch: Integers  # (LANES,) what the lanes are about
     keepers: Integers  # (LANES,) lanes of nodes that become parts
-    openers: Integers  # (LANES,) lanes of nodes to open
+    openers: Integers  # (LANES,) nodes to open, or their lanes
     lanes: Floats  # (COLUMNS x LANES,)
 
 
@@ -138,6 +139,7 @@ def new_room(n: int) -> Room:
     """Return the memory for a sum over n triangles."""
     return Room(
         new_queue(n),
+        np.empty(n + LANES, np.int64),
         np.empty(n + LANES, np.int64),
         np.empty(n, np.int64),
         np.empty(n, np.int64),

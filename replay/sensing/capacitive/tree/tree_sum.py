@@ -25,7 +25,7 @@ from replay.sensing.capacitive.placed_plate import (
 )
 from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine
+from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine, split_at_plane
 from replay.sensing.capacitive.tree.part_sum import sum_of_parts
 from replay.sensing.capacitive.tree.parts import Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
@@ -88,12 +88,12 @@ def _sum_one(
         return math.inf, True, 0.0
     empty(room.queue)
     budget, tally, lost = budget_of(clusters.nodes, plate, rtol), SumTally(0.0, 0.0, 0.0, 0.0), 0.0
-    room.stack[0] = 0
-    size, judged, alone, touching = 1, 0, 0, False
+    size, waiting, judged = split_at_plane(clusters, plate, room)
+    alone, touching = 0, False
     while True:
-        count, in_hard, opened, tally = refine(clusters, plate, budget, room, size, tally)
+        count, in_hard, opened, tally = refine(clusters, plate, budget, room, size, waiting, tally)
         judged += opened
-        size = 0
+        size = waiting = 0
         if count == 0:
             break
         alone += count
