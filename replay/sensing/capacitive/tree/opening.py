@@ -262,7 +262,7 @@ def _settle_triangles(
 def _highest(triangles: Floats, k: int, plate: PlacedPlate) -> float:
     """Return the largest z of a triangle's corners in the plate's frame [m]."""
     T = plate.T_plate_body
-    return max(  # type: ignore[no-any-return]
+    return max(
         place(T, triangles[k, 0], triangles[k, 1], triangles[k, 2])[2],
         place(T, triangles[k, 3], triangles[k, 4], triangles[k, 5])[2],
         place(T, triangles[k, 6], triangles[k, 7], triangles[k, 8])[2],
