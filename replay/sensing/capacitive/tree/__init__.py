@@ -10,8 +10,8 @@ To be read in this order:
 
 1. `registers`: where each number stands. `clusters`: what is kept of a body's tree, once; `moments`: how it is found.
 2. `tree_sum`: the whole way of one pose and plate. It asks for infinity first, then opens and sums.
-3. `opening`: the budget, and which parts are opened, first of all what is across z = 0; `parts` is the queue that they
-   wait in, and the memory for all.
+3. `opening`: which parts are opened, first of all what is across z = 0, until the `budget` is met; `parts` is the queue
+   that they wait in, and the memory for all.
 4. `lanes`: nodes, triangles and pieces are judged and summed many side by side. `cluster_bounds` and `triangle_bounds`
    judge: whether one can be summed as it is, and how wrong that may be.
 5. `hard_triangles`: what no rule fits is cut; `triangle_pieces`: how.

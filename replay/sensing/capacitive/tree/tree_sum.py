@@ -23,9 +23,10 @@ from replay.sensing.capacitive.placed_plate import (
     placed_plate,
     write_triangle,
 )
+from replay.sensing.capacitive.tree.budget import SumTally, budget_of
 from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine, split_at_plane
+from replay.sensing.capacitive.tree.opening import refine, split_at_plane
 from replay.sensing.capacitive.tree.part_sum import sum_of_parts
 from replay.sensing.capacitive.tree.parts import Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
