@@ -61,7 +61,11 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
 
         version = model.collision
         found += pipeline.kernels(
-            bounds=version.bounds, narrowphase=version.narrowphase, pieces=version.pieces, savings=savings
+            bounds=version.bounds,
+            narrowphase=version.narrowphase,
+            pieces=version.pieces,
+            savings=savings,
+            between=version.between,
         )
     for name, kind in KINDS.items():
         if name in needs.sensors:

@@ -24,10 +24,10 @@ from replay.errors import LimitError, RecordingError
 from replay.json_text import read_json, typed
 from replay.simulation import BLOCK_FRAMES, Layout
 
-FORMAT = 1
+FORMAT = 2
 """Version of the recording format that is written."""
-READABLE_FORMATS = (1,)
-"""Versions that are read: the one that is written and, once there is one, the one before."""
+READABLE_FORMATS = (1, 2)
+"""Versions that are read: the one that is written and the one before."""
 RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 WITHOUT_RESULTS = ("bench", "cli")
