@@ -137,7 +137,7 @@ class Experience:
 
 
 def try_mutation(
-    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, budget: float
+    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, options: argparse.Namespace
 ) -> tuple[Outcome, str]:
     """Return what became of a mutation and how its kernels were run.
 
@@ -146,13 +146,14 @@ def try_mutation(
     """
     text = mutation.applied_to((tree.root / mutation.file).read_text(encoding="utf-8"))
     ways = ["plain", "compiled"] if has_kernels(tree.root / mutation.file) else ["compiled"]
+    ways = ways[:1] if options.plain else ways
     spent = 0.0
     for how in ways:
         while True:
             seconds = experience.seconds(how)
-            tests = targets.of(mutation.file, seconds, budget)
+            tests = targets.of(mutation.file, seconds, options.budget)
             if how == "plain":
-                tests = [test for test in tests if seconds[test] <= budget]
+                tests = [test for test in tests if seconds[test] <= options.budget]
             if not tests:
                 outcome = Outcome("passed", 0.0, {}, "no test is about it")
                 break
@@ -179,7 +180,7 @@ def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     todo = [mutation for mutation in mutations if mutation.id not in results]
     _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
     for number, mutation in enumerate(todo, 1):
-        outcome, how = try_mutation(mutation, tree, targets, experience, options.budget)
+        outcome, how = try_mutation(mutation, tree, targets, experience, options)
         result = {
             "id": mutation.id,
             "place": f"{mutation.file}:{mutation.line}",
@@ -256,6 +257,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--room", action="append", default=[], help="only this room's share; may be repeated")
     parser.add_argument("--budget", type=float, default=40.0, help="seconds of tests that are asked about one mutant")
+    parser.add_argument("--plain", action="store_true", help="kernels as plain Python alone: quick, and more survive")
     parser.add_argument("--again", action="store_true", help="try survivors of an earlier run again")
     parser.add_argument("--planted", nargs="*", metavar="NAME", help="the faults of planted.yaml instead, or some")
     parser.add_argument("--work", type=Path, default=CHECKOUT / "recordings" / "mutants")
