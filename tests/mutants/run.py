@@ -52,8 +52,8 @@ def planted_faults() -> list[Planted]:
 
 
 def equivalents() -> set[tuple[str, str, str]]:
-    """Return file, text and new text of the mutations that are known to change nothing."""
-    return {(one["file"], one["old"].strip(), one["new"].strip()) for one in _yaml("equivalent.yaml")}
+    """Return file, text and new text of mutations that are known to change nothing; "" where none of a line does."""
+    return {(one["file"], one["old"].strip(), one.get("new", "").strip()) for one in _yaml("equivalent.yaml")}
 
 
 def _yaml(name: str) -> list[dict[str, Any]]:
@@ -85,7 +85,8 @@ def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[lis
                 break
             if (mutation.file, mutation.line) in lines:
                 continue
-            if (mutation.file, mutation.old.strip(), mutation.new.strip()) in known:
+            old, new = mutation.old.strip(), mutation.new.strip()
+            if not known.isdisjoint({(mutation.file, old, new), (mutation.file, old, "")}):
                 left_out[room] = left_out.get(room, 0) + 1
             elif is_python(mutation.applied_to((root / mutation.file).read_text(encoding="utf-8"))):
                 lines.add((mutation.file, mutation.line))
