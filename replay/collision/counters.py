@@ -29,9 +29,8 @@ class Counters:
         contacts: at level contact.
         contained: contacts of a body wholly inside another.
         undecided: at level contact because GJK reached its accuracy limit.
-        intervals: between frames, of pairs that were looked at there; those of the rest are clear by the same bounds.
-        intervals_by_block: of those, proven for the whole block at once.
-        intervals_by_frames: proven by what is known at their ends.
+        intervals: between frames, asked for.
+        intervals_by_frames: proven by what is known at their ends; what is not told here was proven for a whole block.
         intervals_searched: in doubt, and searched.
         moments: poses between frames that the search looked at.
         moment_queries: pairs of convex sets decided there.
@@ -54,7 +53,6 @@ class Counters:
     contained: int = 0
     undecided: int = 0
     intervals: int = 0
-    intervals_by_block: int = 0
     intervals_by_frames: int = 0
     intervals_searched: int = 0
     moments: int = 0
@@ -62,8 +60,6 @@ class Counters:
 
     def add_intervals(self, proven: Sequence[int], searched: Sequence[int]) -> None:
         """Add the counts of `interval_proof.certify` and of `crossing_search.search`."""
-        self.intervals += sum(proven)
-        self.intervals_by_block += proven[interval_proof.BY_BLOCK]
         self.intervals_by_frames += proven[interval_proof.BY_FRAMES]
         self.intervals_searched += proven[interval_proof.IN_DOUBT]
         self.moments += searched[crossing_search.MOMENTS]

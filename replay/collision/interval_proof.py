@@ -16,15 +16,64 @@ from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
 from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, boxes_gap, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
-from replay.numerics.arrays import Bytes, Floats, Integers
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
-COUNTS = 3
-BY_BLOCK, BY_FRAMES, IN_DOUBT = range(COUNTS)
-"""Counters of pair-intervals: proven for a whole block, by the frames' distances, and left to the search."""
+COUNTS = 2
+BY_FRAMES, IN_DOUBT = range(COUNTS)
+"""Counters of pair-intervals: proven by the frames' distances, and left to the search."""
 
 CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 """As `columns.Between`."""
+
+
+@entry(
+    VOLUMES_TYPE,
+    int64[:, ::1],
+    float64[:, :, :, ::1],
+    int64[:, ::1],
+    float64[::1],
+    float64[::1],
+    float64,
+    boolean[::1],
+    boolean[::1],
+)
+@leaf_kernel
+def keep_near(
+    volumes: Volumes,
+    pairs: Integers,
+    middle: Floats,
+    rows: Integers,
+    total: Floats,
+    rounding: Floats,
+    cap: float,
+    near: Flags,
+    wanted: Flags,
+) -> None:
+    """Find the pairs that may come nearer than `cap` in a block, by their spheres in its middle frame and their ways.
+
+    Args:
+        volumes: of all bodies.
+        pairs: (P, 4) as `PairFrames.pairs`.
+        middle: (Q, 1, 4, 4) T_a_b of the links in the middle frame.
+        rows: (P, 4) as of `certify`.
+        total: (V,) sum of each way over the block [m].
+        rounding: (V,) see `ways.fill_ways`.
+        cap: [m].
+        near: (P,) out.
+        wanted: (Q,) out, the link pairs of these.
+    """
+    for q in range(len(wanted)):
+        wanted[q] = False
+    for p in range(len(pairs)):
+        gap = sphere_gap(volumes, pairs[p, 0], pairs[p, 1], middle[pairs[p, 2], 0])
+        way, wide = 0.0, 0.0
+        for k in range(2):
+            way += total[rows[p, k]] + 2.0 * rounding[rows[p, k]]
+            wide += total[rows[p, 2 + k]] + 2.0 * rounding[rows[p, 2 + k]]
+        near[p] = not gap > max(cap + way, wide)
+        if near[p]:
+            wanted[pairs[p, 2]] = True
 
 
 @entry(
@@ -38,7 +87,6 @@ CLEAR, CONTACT, UNDECIDED = 0, 1, 2
     float64[::1],
     float64,
     float64,
-    boolean,
     uint8[:, ::1],
     float64[:, ::1],
     uint8[:, ::1],
@@ -57,7 +105,6 @@ def certify(
     rounding: Floats,
     limit: float,
     cap: float,
-    savings: bool,
     between: Bytes,
     bound: Floats,
     doubt: Bytes,
@@ -76,7 +123,6 @@ def certify(
         ways, rounding: see `ways.fill_ways`; column f - begin is of the interval that ends at frame f.
         limit: up to which the narrow phase looked for distances [m].
         cap: largest bound that is told [m].
-        savings: whether pairs are ruled out for the whole block.
         between, bound: (n, P) out; `bound` is NaN and `between` UNDECIDED where there is doubt of a contact.
         doubt: (n, P) out, bits of `crossing_search`.
         counts: (COUNTS,) added to.
@@ -87,15 +133,6 @@ def certify(
         a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
         way_a, way_b, wide_a, wide_b = rows[p, 0], rows[p, 1], rows[p, 2], rows[p, 3]
         error, wide_error = 2.0 * (rounding[way_a] + rounding[way_b]), 2.0 * (rounding[wide_a] + rounding[wide_b])
-        total, wide_total = error, wide_error
-        for f in range(begin, n):
-            total += ways[way_a, f - begin] + ways[way_b, f - begin]
-            wide_total += ways[wide_a, f - begin] + ways[wide_b, f - begin]
-        if savings and sphere_gap(volumes, a, b, frames.poses[q, n // 2]) > max(cap + total, wide_total):
-            counts[BY_BLOCK] += n - begin
-            for f in range(begin, n):
-                between[f, p], bound[f, p], doubt[f, p] = CLEAR, cap, 0
-            continue
         gap1, near1, level1 = 0.0, 0.0, 0
         unsure1 = False
         for f in range(begin - 1, n):

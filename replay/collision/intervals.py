@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
-from replay.numerics.arrays import Bytes, Floats, Integers
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 
 RESOLUTION = 1_000
 """Longest bracket of a moment that is aimed at [ns]."""
@@ -41,6 +42,11 @@ class Course:
     begin: int
     ways: Floats
     rounding: Floats
+
+    @cached_property
+    def total(self) -> Floats:
+        """The sum of each way over the block [m]."""
+        return np.add.accumulate(self.ways, axis=1)[:, -1] * (1.0 + 2.0**-40)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +137,22 @@ class Intervals:
         near = self._first[pairs] + shared[:, None]
         return np.concatenate([near, self._first[pairs] if self._volumes.kind == AABB else near], axis=1)
 
+    def near(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> tuple[Flags, Flags]:
+        """Return which pairs (P,) may be nearer in a block than the largest bound told, and their link pairs (Q,).
+
+        Args:
+            pairs: (P, 4) as `PairFrames.pairs`.
+            middle: (Q, 1, 4, 4) T_a_b of the links in the block's middle frame.
+            rows: of `Course.ways`.
+            course: of the block.
+        """
+        near, wanted = np.ones(len(pairs), dtype=bool), np.ones(len(middle), dtype=bool)
+        if self._savings:
+            interval_proof.keep_near(
+                self._volumes, pairs, middle, rows, course.total, course.rounding, self._cap, near, wanted
+            )
+        return near, wanted
+
     def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:
         """Return what is known of pairs that were decided in all frames of a block, and in the frame before it."""
         n, count = frames.level.shape
@@ -149,7 +171,6 @@ class Intervals:
             course.rounding,
             self._limit,
             self._cap,
-            self._savings,
             between,
             bound,
             doubt,

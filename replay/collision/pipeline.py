@@ -207,6 +207,7 @@ class CollisionPipeline:
         if self._intervals is not None and time is not None and len(time) > 1:
             course = self._intervals.course(poses, lead, time, first)
             between, bound = self._intervals.clear(shape, course)
+            self.counters.intervals += (shape[0] - course.begin) * shape[1]
             columns = replace(columns, between=between, clearance_bound=bound)
         crossings = []
         for found in self._evaluate(poses, lead, course):
@@ -287,20 +288,26 @@ class CollisionPipeline:
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
     def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> _Found:
-        frames = self._decided(batch, poses.slice(lead, len(poses.local)))
-        known = None
+        rows, columns, ways, known, n = batch.rows, batch.columns, batch.ways, None, len(poses.local)
+        wanted = None
         if course is not None and self._intervals is not None:
-            head = self._decided(batch, poses.slice(0, 1)) if lead else None
-            known = self._intervals.answer(frames, head, batch.ways, course)
-        return _Found(batch.columns, batch.rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+            middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
+            near, wanted = self._intervals.near(rows, middle, ways, course)
+            self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
+            rows, columns, ways = rows[near], columns[near], ways[near]
+        frames = self._decided(batch, rows, wanted, poses.slice(lead, n))
+        if course is not None and self._intervals is not None:
+            head = self._decided(batch, rows, wanted, poses.slice(0, 1)) if lead else None
+            known = self._intervals.answer(frames, head, ways, course)
+        return _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
 
-    def _decided(self, batch: _Batch, poses: LinkPoses) -> PairFrames:
-        """Return what is found of a batch's pairs in frames."""
-        relative = batch.relative.of(poses.local)
+    def _decided(self, batch: _Batch, rows: Integers, wanted: Flags | None, poses: LinkPoses) -> PairFrames:
+        """Return what is found of some of a batch's pairs, whose link pairs are wanted, in frames."""
+        relative = batch.relative.of(poses.local, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
             turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
-        frames = unanswered(batch.rows, relative, turns)
+        frames = unanswered(rows, relative, turns)
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
         limit = self._limit
