@@ -1,13 +1,8 @@
 """Between two frames: a proof that a pair stays apart, or the moment at which it meets, by bisection in time.
 
-The pair's links are joined by a way of joints, from link a up to the nearest common ancestor and down to link b. For
-any link m on it, no point of B moves, as seen from m, farther in an interval than
-    L_m = sum over joints between A and m of TV R^A + sum over joints between m and B of TV R^B,
-TV the joint's travel and R^X the lever arm of body X: 1 for a joint that moves along an axis; for one that turns, the
-distance of X's bounding sphere from the axis at one end, its radius, and what the joints between may add. The least
-over m counts. Two bodies that are d0 and d1 apart at the ends cannot meet in between if d0 + d1 > L; their distance is
-at least (d0 + d1 - L) / 2 throughout. A free joint is a translation and, on the side of its link, a rotation about the
-link's origin.
+Two bodies that are d0 and d1 apart at the ends of an interval in which no point of one moves farther than L, as seen
+from the other (`way_steps`), cannot meet in between if d0 + d1 > L: then they are at least (d0 + d1 - L) / 2 apart.
+Where that does not hold, their pieces may be apart by bounds along directions (`piece_proof`).
 
 Where the proof fails the interval is halved, the earlier half first, with the exact poses at the middle: `sweep`. It
 ends with every part proven, with a meeting whose every earlier moment is proven clear up to a `resolution` before, or
@@ -17,29 +12,37 @@ Times are whole nanoseconds, so that whoever asks for the poses at the time that
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64, uint8
-from numpy.typing import NDArray
 
 from replay.collision import traversal
 from replay.collision.bodies import AABB, BODIES_TYPE, OBB, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
+from replay.collision.directed import Lines, lines, measure_changes, write_lines
 from replay.collision.gjk_exact import SEPARATED, UNDECIDED, Workspace, workspace
 from replay.collision.gjk_kernel import ROUNDING
 from replay.collision.narrow import hold_each_other
+from replay.collision.piece_proof import Ends, apart_by_pieces, apart_in_world, ends, sets_apart, write_end
+from replay.collision.support import SETS_TYPE, Sets
 from replay.collision.traversal import STACK, closest
+from replay.collision.way_steps import (
+    BALL,
+    CHAINS_TYPE,
+    Chains,
+    Scratch,
+    least_way,
+    list_steps,
+    measure_arms,
+    measure_travel,
+    place,
+    way_scratch,
+)
 from replay.geometry.overlap import obbs_gap
-from replay.kinematics.linkage import POSE_ROUNDING
-from replay.kinematics.timeline import FIXED, FREE, PRISMATIC, TIMELINE_TYPE, Timeline, compose, local_pose
-from replay.kinematics.travel import HALVINGS, SHIFT, TRAVEL, TURN, free_travel, joint_travel
+from replay.kinematics.timeline import TIMELINE_TYPE, Timeline, last_at_or_before
+from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel, record
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 
 LOOKS = 1024
 """Cap of a search: moments looked at. What is left then is undecided."""
@@ -51,7 +54,8 @@ where the parts just before it cannot be proven."""
 DEPTH = 80
 """Moments waiting: each halves what is left of at most 2^63 ns."""
 
-ROUNDING_UP = 1.0 + 2.0**-40
+_MEETING = 2.0**-43
+"""Of all lengths: more than what tests of volumes give in favour of meeting."""
 
 BODIES, VOLUMES = 0, 1
 """What is searched for: a contact of the bodies, or of their bounding volumes."""
@@ -63,22 +67,8 @@ COUNTS = traversal.COUNTS + 1
 MOMENTS = traversal.COUNTS
 """Counter after those of `traversal`: moments looked at."""
 
-ALONG, ABOUT, BALL = range(3)
-"""Kinds of steps of a way: along an axis or a path, about an axis, about a point."""
-
 PROVEN, FOUND, UNPROVEN = range(3)
 """What a search ends with; as `columns.Between` has it: clear, contact, undecided."""
-
-
-class Chains(NamedTuple):
-    """Ways between links: the links of side s of way q, from below the common ancestor down, are `link[first[2 q + s]:
-    first[2 q + s + 1]]`."""
-
-    first: Integers
-    link: Integers
-
-
-CHAINS_TYPE = record(Chains, int64[::1], int64[::1])
 
 
 class Questions(NamedTuple):
@@ -94,25 +84,6 @@ class Questions(NamedTuple):
 QUESTIONS_TYPE = record(Questions, int64[:, ::1], int64[:, ::1], int64[:, ::1], uint8[:, ::1], uint8[::1])
 
 
-class Scratch(NamedTuple):
-    """What a search works in: the way of the pair at one time, and its steps from A to B."""
-
-    frames: Floats  # (2, D + 1, 4, 4) identity, then the poses of the links of each side in their common ancestor
-    pose: Floats  # (4, 4, 4): local pose, its scratch, an inverse, and T_a_b
-    kind: Integers  # (E,)
-    side: Integers  # (E,)
-    row: Integers  # (E,) of `frames`: of the link whose joint it is
-    link: Integers  # (E,)
-    travel: Floats  # (E,) in an interval
-    arm: Floats  # (2, E): lever arms of A and of B
-    sum: Floats  # (E + 1,)
-    variation: Floats  # (HALVINGS + 8, 8)
-    found: Floats  # (4,)
-    boxes: Floats  # (8, 4)
-    turn: Floats  # (3, 3)
-    center: Floats  # (2, 3) of the bodies' spheres, in the common ancestor
-
-
 class Search(NamedTuple):
     """What a search asks GJK with, and the moments that it waits to deal with."""
 
@@ -126,36 +97,14 @@ class Search(NamedTuple):
     distance: Floats  # (DEPTH,) [m] lower bound
     meets: Bytes  # (DEPTH,)
     bracket: Integers  # (2,) [ns] earliest and latest
+    lines: Lines
+    ends: Ends
+    corners: Sets  # row k: of volume k, the centre alone of a sphere
     counts: Integers  # (COUNTS,)
 
 
 @kernel
-def _scratch(links: int) -> Scratch:
-    steps = 4 * links + 2
-    frames = np.zeros((2, links + 1, 4, 4))
-    for side in range(2):
-        for i in range(4):
-            frames[side, 0, i, i] = 1.0
-    return Scratch(
-        frames,
-        np.zeros((4, 4, 4)),
-        np.empty(steps, np.int64),
-        np.empty(steps, np.int64),
-        np.empty(steps, np.int64),
-        np.empty(steps, np.int64),
-        np.empty(steps),
-        np.empty((2, steps)),
-        np.empty(steps + 1),
-        np.empty((HALVINGS + 8, 8)),
-        np.empty(4),
-        np.zeros((8, 4)),
-        np.zeros((3, 3)),
-        np.empty((2, 3)),
-    )
-
-
-@kernel
-def _search(counts: Integers) -> Search:
+def _search(links: int, corners: Sets, counts: Integers) -> Search:
     return Search(
         workspace(),
         np.empty((STACK, 2), np.int64),
@@ -167,116 +116,11 @@ def _search(counts: Integers) -> Search:
         np.empty(DEPTH),
         np.empty(DEPTH, np.uint8),
         np.empty(2, np.int64),
+        lines(links),
+        ends(),
+        corners,
         counts,
     )
-
-
-@leaf_kernel
-def place(line: Timeline, chains: Chains, way: int, t: float, s: Scratch) -> None:
-    """Write the poses of a way's links at time t [s], and T_a_b, as `RelativePoses.of` computes it."""
-    local, spare, inverse, relative = s.pose[0], s.pose[1], s.pose[2], s.pose[3]
-    for side in range(2):
-        begin, end = chains.first[2 * way + side], chains.first[2 * way + side + 1]
-        for k in range(end - begin):
-            local_pose(line, chains.link[begin + k], t, spare, local)
-            compose(s.frames[side, k], local, s.frames[side, k + 1])
-    a = s.frames[0, chains.first[2 * way + 1] - chains.first[2 * way]]
-    for i in range(3):
-        for j in range(3):
-            inverse[i, j] = a[j, i]
-        inverse[i, 3] = -(a[0, i] * a[0, 3] + a[1, i] * a[1, 3] + a[2, i] * a[2, 3])
-    compose(inverse, s.frames[1, chains.first[2 * way + 2] - chains.first[2 * way + 1]], relative)
-
-
-@leaf_kernel
-def list_steps(line: Timeline, chains: Chains, way: int, s: Scratch) -> int:
-    """Write the steps of the way from A to B; return how many."""
-    n = 0
-    for side in range(2):
-        begin, end = chains.first[2 * way + side], chains.first[2 * way + side + 1]
-        for place in range(end - begin):
-            k = place if side == 1 else end - begin - 1 - place
-            link = chains.link[begin + k]
-            kind = line.kind[link]
-            for part in range(2 if kind == FREE else 1 if kind != FIXED else 0):
-                s.side[n], s.row[n], s.link[n] = side, k + 1, link
-                if kind == FREE:  # the rotation is on the side of the link
-                    s.kind[n] = BALL if part == side else ALONG
-                else:
-                    s.kind[n] = ALONG if kind == PRISMATIC else ABOUT
-                n += 1
-    return n
-
-
-@leaf_kernel
-def measure_travel(line: Timeline, n: int, t0: float, t1: float, s: Scratch) -> None:
-    """Write the travel of each of n steps over [t0, t1] [s]."""
-    for i in range(n):
-        link = s.link[i]
-        if line.kind[link] == FREE:
-            free_travel(line, line.joint[link], t0, t1, s.found)
-            s.travel[i] = s.found[TURN if s.kind[i] == BALL else SHIFT]
-        else:
-            joint_travel(line, line.joint[link], t0, t1, s.variation, s.found)
-            s.travel[i] = s.found[TRAVEL]
-
-
-@leaf_kernel
-def measure_arms(
-    line: Timeline, chains: Chains, volumes: Volumes, way: int, a: int, b: int, n: int, s: Scratch
-) -> float:
-    """Write the lever arms of A and B over an interval whose travel is written, from the poses at one end of it.
-
-    Returns the rounding of a pose [m], of either body as seen from the other.
-    """
-    size = volumes.radius[a] + volumes.radius[b]
-    for side in range(2):
-        begin, end = chains.first[2 * way + side], chains.first[2 * way + side + 1]
-        pose, c = s.frames[side, end - begin], volumes.center[a if side == 0 else b]
-        for i in range(3):
-            s.center[side, i] = pose[i, 0] * c[0] + pose[i, 1] * c[1] + pose[i, 2] * c[2] + pose[i, 3]
-            size += abs(c[i])
-        for k in range(end - begin):
-            joint = line.place[chains.link[begin + k]]
-            for i in range(3):
-                # a step's length is at most the way from the step before
-                size += abs(joint[i, 3]) + abs(s.frames[side, k + 1, i, 3] - s.frames[side, k, i, 3])
-    for body in range(2):
-        moved, radius = 0.0, volumes.radius[a if body == 0 else b]
-        for step in range(n):
-            i = step if body == 0 else n - 1 - step
-            arm = 1.0
-            if s.kind[i] != ALONG:
-                pose, axis = s.frames[s.side[i], s.row[i]], line.axis[s.link[i]]
-                x, y, z = (
-                    s.center[body, 0] - pose[0, 3],
-                    s.center[body, 1] - pose[1, 3],
-                    s.center[body, 2] - pose[2, 3],
-                )
-                square = x * x + y * y + z * z
-                if s.kind[i] == ABOUT:
-                    u = pose[0, 0] * axis[0] + pose[0, 1] * axis[1] + pose[0, 2] * axis[2]
-                    v = pose[1, 0] * axis[0] + pose[1, 1] * axis[1] + pose[1, 2] * axis[2]
-                    w = pose[2, 0] * axis[0] + pose[2, 1] * axis[1] + pose[2, 2] * axis[2]
-                    square = (y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2
-                arm = (math.sqrt(square) + radius + moved) * ROUNDING_UP + POSE_ROUNDING * size
-            s.arm[body, i] = arm
-            moved += arm * s.travel[i]
-        size += moved
-    return float(POSE_ROUNDING * size)
-
-
-@leaf_kernel
-def least_way(n: int, s: Scratch) -> float:
-    """Return the least L_m [m] over the links of the way, of an interval whose travel is written."""
-    s.sum[n] = 0.0
-    for i in range(n - 1, -1, -1):
-        s.sum[i] = s.sum[i + 1] + s.travel[i] * s.arm[1, i]
-    before, least = 0.0, s.sum[0]
-    for i in range(n):
-        before += s.travel[i] * s.arm[0, i]
-        least = min(least, before + s.sum[i + 1])
-    return float(least * ROUNDING_UP)
 
 
 @leaf_kernel
@@ -362,6 +206,67 @@ def proven_distance(distance: float, size: float) -> float:
 
 
 @kernel
+def _by_pieces(
+    bodies: Bodies,
+    volumes: Volumes,
+    line: Timeline,
+    chains: Chains,
+    q: Questions,
+    k: int,
+    what: int,
+    t0: int,
+    t1: int,
+    way: float,
+    split: int,
+    n: int,
+    rounding: float,
+    s: Scratch,
+    r: Search,
+) -> float:
+    """Return what `piece_proof` proves of a part whose travel is written; `s` is of the way that is searched."""
+    a, b = q.bodies[k, 0], q.bodies[k, 1]
+    in_world = what == VOLUMES and volumes.kind == AABB
+    path = q.chain[k, 1 if in_world else 0]
+    measure_changes(line, n, t0 / 1e9, t1 / 1e9, s, r.lines)
+    size = bodies.reach[a] + bodies.reach[b] + way
+    for end in range(2):
+        place(line, chains, path, (t0 if end == 0 else t1) / 1e9, s)
+        write_lines(line, chains, path, end, n, s, r.lines)
+        write_end(end, s.pose[3], r.ends)
+    for i in range(3):
+        size += max(abs(r.ends.translation[0, i]), abs(r.ends.translation[1, i]))
+    slack = (8.0 + n) * rounding
+    if what == VOLUMES:
+        size += volumes.radius[a] + volumes.radius[b]
+        slack += _MEETING * size
+        if in_world:
+            return float(apart_in_world(r.corners, a, b, n, slack, s, r.lines))
+        pad = 0.0 if volumes.kind == OBB else volumes.radius[a] + volumes.radius[b]
+        return float(sets_apart(r.corners, a, b, pad, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.counts))
+    return float(apart_by_pieces(bodies, a, b, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.counts))
+
+
+@leaf_kernel
+def _key_frame(line: Timeline, n: int, t0: int, t1: int, s: Scratch) -> int:
+    """Return a moment [ns] within (t0, t1) at which a free joint on the way passes a key frame, -1 if there is none.
+
+    Parts between key frames have bounds along directions that those across one have not.
+    """
+    for i in range(n):
+        link = s.link[i]
+        if s.kind[i] == BALL:
+            free = line.joint[link]
+            begin, end = line.key_first[free], line.key_first[free + 1]
+            first = last_at_or_before(line.key_time, begin, end, t0 / 1e9)
+            last = last_at_or_before(line.key_time, begin, end, t1 / 1e9)
+            if last > first:
+                moment = round(line.key_time[(first + last + 1) // 2] * 1e9)
+                if t0 < moment < t1:
+                    return int(moment)
+    return -1
+
+
+@kernel
 def sweep(
     bodies: Bodies,
     volumes: Volumes,
@@ -410,7 +315,14 @@ def sweep(
                 waiting -= 1
                 continue
             measure_travel(line, n, min(t, frontier) / 1e9, max(t, frontier) / 1e9, steps)
-            apart = 0.5 * (distance + d - least_way(n, steps) - 2.0 * rounding)
+            way, split = least_way(n, steps)
+            way += 2.0 * rounding
+            apart = 0.5 * (distance + d - way)
+            if not apart > 0.0:
+                low, high = min(t, frontier), max(t, frontier)
+                apart = _by_pieces(
+                    bodies, volumes, line, chains, q, k, what, low, high, way, split, n, rounding, steps, r
+                )
             if apart > 0.0:
                 bound, frontier, distance = min(bound, apart), t, d
                 waiting -= 1
@@ -425,7 +337,9 @@ def sweep(
             frontier, distance = t, d
             waiting -= 1
             continue
-        middle = frontier + (t - frontier) // 2
+        middle = _key_frame(line, n, min(t, frontier), max(t, frontier), steps)
+        if middle < 0:
+            middle = frontier + (t - frontier) // 2
         looks += 1
         found, apart = look(bodies, volumes, line, chains, q, k, what, middle, limit, s, wide, r)
         r.time[waiting], r.distance[waiting], r.meets[waiting] = middle, apart, 1 if found else 0
@@ -438,6 +352,7 @@ def sweep(
 @entry(
     BODIES_TYPE,
     VOLUMES_TYPE,
+    SETS_TYPE,
     TIMELINE_TYPE,
     CHAINS_TYPE,
     QUESTIONS_TYPE,
@@ -452,6 +367,7 @@ def sweep(
 def search(
     bodies: Bodies,
     volumes: Volumes,
+    corners: Sets,
     line: Timeline,
     chains: Chains,
     q: Questions,
@@ -466,6 +382,7 @@ def search(
 
     Args:
         bodies, volumes, line, chains: of the scene.
+        corners: of the volumes, row k of volume k; the centre alone of a sphere.
         q: k questions.
         cap: distances above it are of no interest [m].
         resolution: longest bracket [ns] that is aimed at.
@@ -477,7 +394,7 @@ def search(
     longest = 0
     for row in range(len(chains.first) - 1):
         longest = max(longest, chains.first[row + 1] - chains.first[row])
-    s, wide, r = _scratch(longest), _scratch(longest), _search(counts)
+    s, wide, r = way_scratch(longest), way_scratch(longest), _search(longest, corners, counts)
     written = 0
     for k in range(len(q.doubt)):
         a, b, t0, t1 = q.bodies[k, 0], q.bodies[k, 1], q.time[k, 0], q.time[k, 1]
@@ -486,7 +403,7 @@ def search(
         n = list_steps(line, chains, way, s)
         measure_travel(line, n, t0 / 1e9, t1 / 1e9, s)
         rounding = measure_arms(line, chains, volumes, way, a, b, n, s)
-        limit = cap + least_way(n, s)
+        limit = cap + least_way(n, s)[0]
         first, last, apart = -1, -1, -1  # the bodies meet first, meet last, and are apart again, where that was found
         before, after = q.level[k, 0] == 2, q.level[k, 1] == 2
         r.seed[0, 0], r.seed[0, 1] = -1, -1

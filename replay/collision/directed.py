@@ -5,14 +5,14 @@ interval, s any time in it and x in [0, 1] its share. As seen from m a point p o
 from m outwards, with the velocities at t
     v_j(p) = w_j x (p - o_j)  for a step that turns about w_j through o_j,   u_j  for one that moves along u_j,
 taken backwards for the piece on the other side of the joint. Step j has moved by x D_j + e_j, D_j its change over the
-interval, e_j within [lo_j, hi_j]. To first order n . p has changed by sum (x D_j + e_j) n . v_j(p), which is linear in x
-and least at a vertex and at x = 0 or x = 1. What is of second order is at most
+interval, e_j within [lo_j, hi_j]. To first order n . p has changed by sum (x D_j + e_j) n . v_j(p), which is linear in
+x, and least at a vertex and at x = 0 or x = 1. What is of second order is at most
     Q = sum_j R_j TV_j (m_j TV_j / 2 [j turns] + sum over k that turn, nearer m than j, of m_k TV_k),
     m_k = min(1, |n x w_k| + sum over l that turn, nearer m than k, of TV_l),
-since d^2p / dq_j dq_k = w_k x v_j for k nearer m than j; R_j is the lever arm, TV_j the travel. With g the least of this
-sum over B's vertices less the most over A's, at both x, the pieces are at least g - Q apart along n throughout.
+since d^2p / dq_j dq_k = w_k x v_j for k nearer m than j; R_j is the lever arm, TV_j the travel. With g the least of
+this over B's vertices less the most over A's, at both x, the pieces are at least g - Q apart along n throughout.
 
-Such a bound stands alone: it is not the distance at that end less a way, and must not be added to that of the other end.
+Such a bound stands alone: it is no distance at one end less a way, and must not be added to that of the other end.
 
 A free joint follows one stretch between two key frames; what it moves in others is taken off as it is.
 """
@@ -23,16 +23,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.collision.bodies import Bodies
+from replay.collision.support import Sets
 from replay.collision.way_steps import ALONG, BALL, Chains, Scratch
 from replay.kinematics.timeline import FREE, PRISMATIC, Timeline, half_turn, segment
 from replay.kinematics.travel import CHANGE, HIGHEST, LOWEST, joint_travel
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Lines(NamedTuple):
@@ -155,28 +152,26 @@ def write_lines(line: Timeline, chains: Chains, way: int, end: int, n: int, s: S
 
 @leaf_kernel
 def apart_along(
-    bodies: Bodies, sets: tuple[int, int], end: int, split: int, n: int, slack: float, s: Scratch, d: Lines
+    sets: Sets, rows: tuple[int, int], end: int, split: int, n: int, slack: float, s: Scratch, d: Lines
 ) -> float:
     """Return a lower bound on how far two convex sets are apart along `d.normal` throughout an interval [m].
 
     Args:
-        bodies: of the scene.
-        sets: of A and of B, rows of `bodies.sets`.
+        sets: of the scene.
+        rows: of A's and of B's.
         end: at which the first order is taken, 0 or 1.
         split: how many steps lie between A and the link m.
         n: number of steps, whose travel, arms and lines are written.
         slack: rounding of what is added up [m].
     """
-    highest = _reach(bodies, sets[0], 0, end, split, n, s, d)
-    lowest = _reach(bodies, sets[1], 1, end, split, n, s, d)
+    highest = _reach(sets, rows[0], 0, end, split, n, s, d)
+    lowest = _reach(sets, rows[1], 1, end, split, n, s, d)
     second = _second_order(0, end, split, n, s, d) + _second_order(1, end, split, n, s, d)
     return min(lowest[0] - highest[0], lowest[1] - highest[1]) - second * (1.0 + 2.0**-40) - slack
 
 
 @leaf_kernel
-def _reach(
-    bodies: Bodies, set_: int, body: int, end: int, split: int, n: int, s: Scratch, d: Lines
-) -> tuple[float, float]:
+def _reach(sets: Sets, row: int, body: int, end: int, split: int, n: int, s: Scratch, d: Lines) -> tuple[float, float]:
     """Return the most (body 0) or the least (body 1) that a set reaches along n to first order, at x = 0 and x = 1."""
     pose, normal = d.pose[end, body], d.normal
     begin, stop = (0, split) if body == 0 else (split, n)
@@ -205,8 +200,8 @@ def _reach(
             d.sum[1, k] += change * d.gradient[i, k]
     best0, best1 = np.inf, np.inf
     turn = 1.0 if body == 1 else -1.0  # the most is the least of the opposite
-    for v in range(bodies.sets.first[set_], bodies.sets.first[set_ + 1]):
-        x, y, z = bodies.sets.flat[3 * v], bodies.sets.flat[3 * v + 1], bodies.sets.flat[3 * v + 2]
+    for v in range(sets.first[row], sets.first[row + 1]):
+        x, y, z = sets.flat[3 * v], sets.flat[3 * v + 1], sets.flat[3 * v + 2]
         strays = 0.0
         for i in range(begin, stop):
             if d.high[i] > d.low[i]:

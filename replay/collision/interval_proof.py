@@ -11,17 +11,13 @@ import math
 
 import numpy as np
 from numba import boolean, float64, int64, uint8
-from numpy.typing import NDArray
 
 from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
 from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, boxes_gap, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
+from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 
 COUNTS = 3
 BY_BLOCK, BY_FRAMES, IN_DOUBT = range(COUNTS)

@@ -5,23 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import crossing_search, interval_proof
-from replay.collision.bodies import AABB, Bodies, Volumes
+from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
-from replay.collision.crossing_search import Chains, Questions
+from replay.collision.crossing_search import Questions
 from replay.collision.pair_frames import PairFrames
+from replay.collision.support import Sets, make_sets
+from replay.collision.way_steps import Chains
 from replay.collision.ways import fill_ways, first_ways
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from replay.numerics.arrays import Bytes, Floats, Integers
 
 RESOLUTION = 1_000
 """Longest bracket of a moment that is aimed at [ns]."""
@@ -83,6 +81,7 @@ class Intervals:
         self._linkage = linkage
         self._line = timeline(linkage, motion)
         self._bodies, self._volumes, self._links = bodies, volumes, links
+        self._corners = _corners(volumes)
         self._limit, self._cap, self._savings = limit, cap, savings
         self._counters = counters
         self._first = first_ways(links, self._line)
@@ -191,6 +190,7 @@ class Intervals:
         count = crossing_search.search(
             self._bodies,
             self._volumes,
+            self._corners,
             self._line,
             chains,
             questions,
@@ -236,3 +236,20 @@ class Intervals:
                 break
             count += 1
         return count
+
+
+def _corners(volumes: Volumes) -> Sets:
+    """Return the corners of volumes as convex sets, of spheres the centres."""
+    points = volumes.center[:, None, :]
+    if volumes.kind != SPHERE:
+        signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+        steps = signs[None, :, :] * volumes.half[:, None, :]
+        turned = [
+            steps[..., 0] * volumes.axes[:, None, 0, k]
+            + steps[..., 1] * volumes.axes[:, None, 1, k]
+            + steps[..., 2] * volumes.axes[:, None, 2, k]
+            for k in range(3)
+        ]
+        points = points + np.stack(turned, axis=-1)
+    count = points.shape[1]
+    return make_sets(points.reshape(-1, 3), np.arange(len(points) + 1, dtype=np.int64) * count, tables=False)

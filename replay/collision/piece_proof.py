@@ -15,18 +15,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.bodies import Bodies
 from replay.collision.directed import Lines, apart_along
 from replay.collision.gjk_exact import DIRECTION, LOWER, SEPARATED, Workspace
 from replay.collision.gjk_kernel import ROUNDING, query
+from replay.collision.support import Sets
 from replay.collision.traversal import QUERIES, STACK, box_gap
 from replay.collision.way_steps import Scratch
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 MOST_PIECES = 512
 """Cap of pairs of convex sets looked at for one interval; shorter ones have fewer that are near."""
@@ -118,7 +116,7 @@ def apart_by_pieces(
             return 0.0
         set_a = bodies.set_first[a] + bodies.tree.order[bodies.set_first[a] + bodies.tree.begin[row_i]]
         set_b = bodies.set_first[b] + bodies.tree.order[bodies.set_first[b] + bodies.tree.begin[row_j]]
-        apart = _sets_apart(bodies, set_a, set_b, way, split, n, size, slack, s, d, e, work, counts)
+        apart = sets_apart(bodies.sets, set_a, set_b, 0.0, way, split, n, size, slack, s, d, e, work, counts)
         if not apart > 0.0:
             return 0.0
         bound = min(bound, apart)
@@ -126,10 +124,11 @@ def apart_by_pieces(
 
 
 @leaf_kernel
-def _sets_apart(
-    bodies: Bodies,
+def sets_apart(
+    sets: Sets,
     set_a: int,
     set_b: int,
+    pad: float,
     way: float,
     split: int,
     n: int,
@@ -141,13 +140,13 @@ def _sets_apart(
     work: Workspace,
     counts: Integers,
 ) -> float:
-    """Return what `apart_by_pieces` does, of two convex sets."""
-    total = -way
+    """Return what `apart_by_pieces` does, of two convex sets that are thicker by `pad` together [m]."""
+    total = -way - 2.0 * pad
     rounding = 2.0 * ROUNDING * size
     for end in range(2):
         work.simplex[4, 0] = 0
         status = query(
-            bodies.sets, set_a, bodies.sets, set_b, e.rotation[end], e.translation[end], size, way, rounding, work
+            sets, set_a, sets, set_b, e.rotation[end], e.translation[end], size, way + 2.0 * pad, rounding, work
         )
         counts[QUERIES] += 1
         if status != SEPARATED:
@@ -176,7 +175,32 @@ def _sets_apart(
         pose = d.pose[end, 0]
         for k in range(3):
             d.normal[k] = pose[k, 0] * e.candidate[0] + pose[k, 1] * e.candidate[1] + pose[k, 2] * e.candidate[2]
-        best = max(best, apart_along(bodies, (set_a, set_b), end, split, n, slack, s, d))
+        best = max(best, apart_along(sets, (set_a, set_b), end, split, n, slack, s, d) - pad)
+        if best > 0.0:
+            break
+    return best
+
+
+@leaf_kernel
+def apart_in_world(sets: Sets, a: int, b: int, n: int, slack: float, s: Scratch, d: Lines) -> float:
+    """Return a proven lower bound on the distance of two boxes along the world's axes over an interval [m].
+
+    Along such an axis a box and the turned box that it is around reach as far. The way is the one over the world.
+
+    Args:
+        sets: whose rows a and b are the turned boxes.
+        a, b: see above.
+        n, slack, s, d: as of `apart_by_pieces`.
+    """
+    split = 0
+    while split < n and s.side[split] == 0:
+        split += 1
+    best = 0.0
+    for attempt in range(12):
+        axis, end = attempt // 4, attempt // 2 % 2
+        d.normal[0], d.normal[1], d.normal[2] = 0.0, 0.0, 0.0
+        d.normal[axis] = 1.0 if attempt % 2 == 0 else -1.0
+        best = max(best, apart_along(sets, (a, b), end, split, n, slack, s, d))
         if best > 0.0:
             break
     return best

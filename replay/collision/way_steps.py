@@ -16,16 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import Volumes
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import FIXED, FREE, PRISMATIC, Timeline, compose, local_pose
 from replay.kinematics.travel import HALVINGS, SHIFT, TRAVEL, TURN, free_travel, joint_travel
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import kernel, leaf_kernel, record
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 ROUNDING_UP = 1.0 + 2.0**-40
 

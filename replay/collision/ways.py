@@ -16,15 +16,12 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import FREE, PRISMATIC, TIMELINE_TYPE, Timeline
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 ROUNDING_UP = 1.0 + 2.0**-40
 """Above the rounding of everything that is added up here."""

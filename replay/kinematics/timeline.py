@@ -12,14 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.kinematics.linkage import JointType, Linkage
 from replay.kinematics.motion import Motion
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel, record
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FIXED, REVOLUTE, PRISMATIC, FREE = range(4)
 """Kinds of joints, as kernels see them."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.kinematics.timeline import (
     FREE,
@@ -27,19 +26,17 @@ from replay.kinematics.timeline import (
     position,
     segment,
 )
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-
-EPS = 2.0**-52
 
 HALVINGS = 40
 """Cap: an extremum is then known to 1e-12 of the interval, and what is still counted twice is its square."""
 
-ROUNDING = 32.0 * EPS
+ROUNDING = 32.0 * EPSILON
 """Of the largest sum of |terms| of a polynomial: far above the rounding of its value and of its coefficients."""
 
-TURN_ROUNDING = 32.0 * EPS
+TURN_ROUNDING = 32.0 * EPSILON
 """Error of the angle [rad] between two poses of a free joint."""
 
 TRAVEL, CHANGE, LOWEST, HIGHEST = range(4)
@@ -128,7 +125,7 @@ def _variation(c: Floats, a: float, b: float, size: float, work: Floats) -> floa
         for k in range(5):
             path += abs(row[k + 1] - row[k])
         gained = path - abs(row[5] - row[0])
-        if gained <= 4.0 * EPS * size or waiting > HALVINGS:
+        if gained <= 4.0 * EPSILON * size or waiting > HALVINGS:
             total += path
             waiting -= 1
             continue
