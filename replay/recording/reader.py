@@ -212,9 +212,10 @@ class _Assembly:
         """Return the times of the frames of whole blocks: those that every topic of the recording has."""
         per_frame = self._topics.values()
         time = self._topic(FRAMES).time
-        count = min(len(topic.time) for topic in per_frame)
+        count = len(time)
         if self._log.loss is not None:
             block = self._provenance.block_frames
+            count = min(len(topic.time) for topic in per_frame)
             count = count if count == self._provenance.frames else count // block * block
         time = time[:count]
         for topic in per_frame:

@@ -17,7 +17,7 @@ from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_writer import McapFileWriter
 from replay.recording import messages
 from replay.recording.event_messages import encode, read_events
-from replay.recording.events import Events, Transition
+from replay.recording.events import SEVERITY, Events, Transition
 from replay.recording.reader import read
 from tests.recording.test_round_trip import write
 
@@ -41,6 +41,15 @@ def log_message(time: int, frame: int, what: Transition, earliest: int | None = 
         earliest=earliest,
     ).SerializeToString(deterministic=True)
     return data
+
+
+def test_how_severe_each_beginning_is_and_that_an_end_is_information() -> None:
+    """In Foxglove's levels: 2 is information, 3 a warning, 4 an error."""
+    severe = {"bounds": 3, "contact": 4, "undecided": 3, "detection": 2, "too close": 3, "saturation": 3}
+    assert severe == SEVERITY and set(severe) == set(KINDS)
+    for kind, level in severe.items():
+        assert Transition(kind, True, "x", "/y").severity == level
+        assert Transition(kind, False, "x", "/y").severity == 2
 
 
 def log_file(path: Path, times: list[int], payloads: list[bytes]) -> Path:
