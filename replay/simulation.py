@@ -87,7 +87,7 @@ class Simulation:
         self.scene = scene
         self._block_frames = block_frames(len(scene.pairs))
         self._motion = plan(scene.linkage, scene.script)
-        self._proven = getattr(scene.model.collision, "between", "proven") == "proven"
+        self._proven = scene.model.collision.between == "proven"
         self.collision = _collision(scene, self._motion if self._proven else None)
         self.suites: dict[str, Suite] = {
             kind: KINDS[kind].suite(sensors, scene.targets, getattr(scene.model, kind), savings=scene.savings)

@@ -65,7 +65,7 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
             narrowphase=version.narrowphase,
             pieces=version.pieces,
             savings=savings,
-            between=getattr(version, "between", "proven"),
+            between=version.between,
         )
     for name, kind in KINDS.items():
         if name in needs.sensors:

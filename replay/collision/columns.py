@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated
 
 import numpy as np
 
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
-from replay.numerics.columns import Columns, Field
+from replay.numerics.columns import Columns, Field, Kind
 
 MARGIN = 0.05
 """[m] Clearances up to this one are computed where a scenario does not say another."""
@@ -89,7 +89,14 @@ class Crossings:
         return replace(self, pair=pairs[self.pair])
 
 
-NO_CROSSINGS = Crossings.none()
+_BETWEEN = Field(
+    kind=Kind.CATEGORY,
+    each="pairs",
+    states=Between,
+    open=(Between.CLEAR, Between.CONTACT, Between.UNDECIDED),
+    nothing=Between.NOT_LOOKED,
+    since=2,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +119,9 @@ class CollisionColumns(Columns):
     clearance: Annotated[Floats, Field(unit="m", each="pairs", gate="evaluated", chart=_CHART)]
     evaluated: Annotated[Flags, Field(each="pairs", open=(1,), begins=("evaluation of the clearance",))]
     undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
-    between: Bytes | None = None
-    clearance_bound: Floats | None = None
-    crossings: InitVar[Crossings] = NO_CROSSINGS  # no column, so no field
-
-    def __post_init__(self, crossings: Crossings) -> None:
-        object.__setattr__(self, "crossings", crossings)
+    between: Annotated[Bytes | None, _BETWEEN] = None
+    clearance_bound: Annotated[Floats | None, Field(unit="m", each="pairs", gate="between", since=2)] = None
+    crossings: Crossings = field(default_factory=Crossings.none)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ def total(rows):
     return result
 
 
+@pytest.mark.compiled
 def test_leaf_kernels_compute_what_kernels_do_with_or_without_the_option(monkeypatch):
     rows = np.random.default_rng(1).normal(size=(50, 2))
     expected = jit.kernel(total)(rows)
@@ -33,6 +34,7 @@ def test_leaf_kernels_compute_what_kernels_do_with_or_without_the_option(monkeyp
     assert usual(rows) == expected
 
 
+@pytest.mark.compiled
 def test_a_leaf_kernel_that_allocates_fails_to_compile():
     @jit.leaf_kernel
     def allocates(n):
@@ -42,6 +44,7 @@ def test_a_leaf_kernel_that_allocates_fails_to_compile():
         allocates(3)
 
 
+@pytest.mark.compiled
 def test_leaf_kernels_call_leaf_kernels_only():
     # What a leaf kernel calls is compiled without reference counting too, if it is the first to call it: something that
     # allocates would compile or not depending on what ran before.
