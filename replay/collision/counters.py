@@ -20,6 +20,7 @@ class Counters:
         pruned_by_block: ruled out for a whole block, by the tree over all bodies or by the pair's swept spheres.
         pruned_by_sphere: ruled out by bounding spheres in a frame.
         pruned_by_volume: ruled out by the bounding volumes in a frame.
+        pruned_by_way: ruled out because the bodies cannot have come near since they were looked at last.
         repeated: answered from the frame before, the pose being the same.
         narrow: looked at by the narrow phase.
         boxes: pairs of tree boxes bounded.
@@ -43,6 +44,7 @@ class Counters:
     pruned_by_block: int = 0
     pruned_by_sphere: int = 0
     pruned_by_volume: int = 0
+    pruned_by_way: int = 0
     repeated: int = 0
     narrow: int = 0
     boxes: int = 0
@@ -70,6 +72,7 @@ class Counters:
         self.pruned_by_block += sieved[broad.BY_BLOCK]
         self.pruned_by_sphere += sieved[broad.BY_SPHERE]
         self.pruned_by_volume += sieved[broad.BY_VOLUME]
+        self.pruned_by_way += sieved[broad.BY_WAY]
         self.repeated += sieved[broad.BY_REPEAT]
         self.boxes += decided[traversal.BOXES]
         self.gjk_queries += decided[traversal.QUERIES]

@@ -14,8 +14,9 @@ from numba import boolean, float64, int64, uint8
 
 from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
-from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, boxes_gap, proven_distance
+from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
+from replay.collision.volume_gap import boxes_gap
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
@@ -133,57 +134,63 @@ def certify(
         a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
         way_a, way_b, wide_a, wide_b = rows[p, 0], rows[p, 1], rows[p, 2], rows[p, 3]
         error, wide_error = 2.0 * (rounding[way_a] + rounding[way_b]), 2.0 * (rounding[wide_a] + rounding[wide_b])
-        gap1, near1, level1 = 0.0, 0.0, 0
-        unsure1 = False
+        near1, level1, unsure1, left = 0.0, 0, False, 0.0
         for f in range(begin - 1, n):
-            gap0, near0, level0, unsure0 = gap1, near1, level1, unsure1
+            near0, level0, unsure0 = near1, level1, unsure1
             if f < 0:
                 pose, level1, unsure1 = head.poses[q, 0], head.level[0, p], head.undecided[0, p]
                 clearance = head.clearance[0, p]
             else:
                 pose, level1, unsure1 = frames.poses[q, f], frames.level[f, p], frames.undecided[f, p]
                 clearance = frames.clearance[f, p]
-            gap1 = sphere_gap(volumes, a, b, pose)
-            near1 = gap1
+            near1 = 0.0
             if level1 < 2:
                 size = reach[a] + reach[b] + abs(pose[0, 3]) + abs(pose[1, 3]) + abs(pose[2, 3])
-                near1 = max(gap1, proven_distance(limit if math.isnan(clearance) else clearance, size), 0.0)
+                near1 = max(proven_distance(limit if math.isnan(clearance) else clearance, size), 0.0)
             if f < begin:
                 continue
             way = ways[way_a, f - begin] + ways[way_b, f - begin]
             if way > 0.0:
                 way += error
             between[f, p], bound[f, p], doubt[f, p] = CLEAR, 0.0, 0
-            least = 0.5 * (near0 + near1 - way)
+            # the bodies
             if level0 == 2 or level1 == 2:
                 proven = (level0 == 2 and not unsure0) or (level1 == 2 and not unsure1)
                 between[f, p] = CONTACT if proven else UNDECIDED
                 if level0 != level1 and (level0 < 2 or level1 < 2):
                     doubt[f, p] |= CONTACT_DOUBT
-            elif least > 0.0 or way == 0.0:
-                bound[f, p] = min(max(least, 0.0), cap)
             else:
-                doubt[f, p] |= CONTACT_DOUBT
+                least = 0.5 * (near0 + near1 - way)
+                if not least > 0.0 and way > 0.0:
+                    before = head.poses[q, 0] if f == 0 else frames.poses[q, f - 1]
+                    least = max(near0, sphere_gap(volumes, a, b, before))
+                    least = 0.5 * (least + max(near1, sphere_gap(volumes, a, b, pose)) - way)
+                if not least > 0.0 and way > 0.0:
+                    doubt[f, p] |= CONTACT_DOUBT
+                bound[f, p] = min(max(least, 0.0), cap)
+            # their volumes
+            wide = ways[wide_a, f - begin] + ways[wide_b, f - begin]
+            if wide > 0.0:
+                wide += wide_error
+            left -= wide
             if (level0 == 0) != (level1 == 0):
                 doubt[f, p] |= BOUNDS_DOUBT
-            elif level0 == 0:
-                wide = ways[wide_a, f - begin] + ways[wide_b, f - begin]
-                if wide > 0.0:
-                    wide += wide_error
-                if wide > 0.0 and not gap0 + gap1 > wide:
-                    boxes = 0.0
-                    for k in range(2):
-                        at = head.poses[q, 0] if f + k == 0 else frames.poses[q, f + k - 1]
-                        turned = head.turns[turn, 0] if f + k == 0 else frames.turns[turn, f + k - 1]
-                        if volumes_meet(volumes, a, b, at, turned, scratch):
-                            boxes = -np.inf
-                        else:
-                            boxes += max(boxes_gap(volumes, a, b, at, turned, scratch), 0.0)
-                    if not boxes > wide:
-                        doubt[f, p] |= BOUNDS_DOUBT
-                    elif doubt[f, p] & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
-                        doubt[f, p] = 0
-                        bound[f, p] = min(0.5 * (boxes - way), cap)
+            elif level0 == 0 and wide > 0.0 and (left <= 0.0 or doubt[f, p] & CONTACT_DOUBT):
+                boxes = 0.0
+                for k in range(2):
+                    at = head.poses[q, 0] if f + k == 0 else frames.poses[q, f + k - 1]
+                    turned = head.turns[turn, 0] if f + k == 0 else frames.turns[turn, f + k - 1]
+                    left = 0.0
+                    if not volumes_meet(volumes, a, b, at, turned, scratch):
+                        left = max(boxes_gap(volumes, a, b, at, turned, scratch), 0.0)
+                    boxes += left
+                if not boxes > wide:
+                    doubt[f, p] |= BOUNDS_DOUBT
+                elif doubt[f, p] & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
+                    doubt[f, p] = 0
+                    bound[f, p] = min(0.5 * (boxes - way), cap)
+            if level1 > 0:
+                left = 0.0
             if doubt[f, p] & CONTACT_DOUBT and level0 < 2 and level1 < 2:
                 between[f, p], bound[f, p] = UNDECIDED, np.nan
             counts[BY_FRAMES if doubt[f, p] == 0 else IN_DOUBT] += 1

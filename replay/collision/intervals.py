@@ -140,6 +140,8 @@ class Intervals:
     def near(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> tuple[Flags, Flags]:
         """Return which pairs (P,) may be nearer in a block than the largest bound told, and their link pairs (Q,).
 
+        The rest is clear in and between all frames.
+
         Args:
             pairs: (P, 4) as `PairFrames.pairs`.
             middle: (Q, 1, 4, 4) T_a_b of the links in the block's middle frame.
@@ -147,10 +149,9 @@ class Intervals:
             course: of the block.
         """
         near, wanted = np.ones(len(pairs), dtype=bool), np.ones(len(middle), dtype=bool)
-        if self._savings:
-            interval_proof.keep_near(
-                self._volumes, pairs, middle, rows, course.total, course.rounding, self._cap, near, wanted
-            )
+        interval_proof.keep_near(
+            self._volumes, pairs, middle, rows, course.total, course.rounding, self._cap, near, wanted
+        )
         return near, wanted
 
     def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:

@@ -25,6 +25,7 @@ from replay.collision import (
     scan,
     support,
     traversal,
+    way_sieve,
     ways,
 )
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
@@ -68,7 +69,7 @@ def kernels(
     used += [decomposition] if pieces == "convex" else []
     used += [traversal] if narrowphase == "fcl" else [narrow if savings else scan]
     if between == "proven":
-        used += [travel, ways, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
+        used += [travel, ways, way_sieve, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
     return (*entries_of(*used), broad.sieve if savings else broad.keep_all)
 
 
@@ -147,9 +148,12 @@ class CollisionPipeline:
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
+            self._bodies = arrays
             self.narrow_phase = _engine(narrowphase, chosen, arrays, savings)
         # between frames distances are our own, whatever decides at the frames
-        self._own = partial(narrow.decide, arrays) if chosen and narrowphase == "fcl" else None
+        self._own: NarrowPhase | None = None
+        if chosen and motion is not None and narrowphase == "fcl":
+            self._own = partial(narrow.decide, arrays)
         self._cap = math.inf if clearance == "always" else float(margin)
         self._intervals: Intervals | None = None
         if chosen and motion is not None:
@@ -293,16 +297,43 @@ class CollisionPipeline:
         if course is not None and self._intervals is not None:
             middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
             near, wanted = self._intervals.near(rows, middle, ways, course)
-            self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
-            rows, columns, ways = rows[near], columns[near], ways[near]
-        frames = self._decided(batch, rows, wanted, poses.slice(lead, n))
+            if self._savings:
+                self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
+                rows, columns, ways = rows[near], columns[near], ways[near]
+            else:
+                wanted = None
+        shown, first = poses.slice(lead, n), poses.slice(0, 1)
+        engine = self.narrow_phase
+        frames = self._decided(engine, batch, rows, wanted, shown, (ways, course))
         if course is not None and self._intervals is not None:
-            head = self._decided(batch, rows, wanted, poses.slice(0, 1)) if lead else None
-            known = self._intervals.answer(frames, head, ways, course)
+            head = self._decided(engine, batch, rows, wanted, first, (ways, None)) if lead else None
+            told, before = frames, head
+            if self._own is not None:
+                mine = self._decided(self._own, batch, rows, wanted, shown, (ways, course))
+                told = frames._replace(clearance=mine.clearance)
+                if head is not None:
+                    mine = self._decided(self._own, batch, rows, wanted, first, (ways, None))
+                    before = head._replace(clearance=mine.clearance)
+            known = self._intervals.answer(told, before, ways, course)
+            if not self._savings:  # as it is told where these are not looked at
+                known.bound[(known.between == Between.CLEAR) & ~near] = self._cap
         return _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
 
-    def _decided(self, batch: _Batch, rows: Integers, wanted: Flags | None, poses: LinkPoses) -> PairFrames:
-        """Return what is found of some of a batch's pairs, whose link pairs are wanted, in frames."""
+    def _decided(
+        self,
+        engine: NarrowPhase,
+        batch: _Batch,
+        rows: Integers,
+        wanted: Flags | None,
+        poses: LinkPoses,
+        moving: tuple[Integers, Course | None],
+    ) -> PairFrames:
+        """Return what is found of some of a batch's pairs, whose link pairs are wanted, in frames.
+
+        Args:
+            engine, batch, rows, wanted, poses: see above.
+            moving: the pairs' rows of ways, and the course on which the frames lie, None if it is not known.
+        """
         relative = batch.relative.of(poses.local, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
@@ -311,12 +342,28 @@ class CollisionPipeline:
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
         limit = self._limit
-        if self._savings:
+        ways, course = moving
+        if self._savings and course is not None and not self._uses_world and self._own is None:
+            way_sieve.sieve_by_way(
+                self._bodies,
+                self._volumes,
+                frames,
+                course.begin,
+                ways,
+                course.ways,
+                course.rounding,
+                limit,
+                sieved,
+                scratch,
+                np.empty((3, 3)),
+                np.empty(3),
+            )
+        elif self._savings:
             broad.sieve(self._volumes, frames, limit, sieved, spreads, scratch)
         else:
             broad.keep_all(self._volumes, frames, scratch)
             limit = math.inf if limit > 0.0 else 0.0
-        self.narrow_phase(frames, limit, decided)
+        engine(frames, limit, decided)
         if not self._savings:
             frames.clearance[frames.clearance > self._limit] = np.nan
         self.counters.add(sieved.tolist(), decided.tolist())
