@@ -51,6 +51,9 @@ PARTS = 8
 """The shortest part that is looked at is this part of the resolution: so a meeting stays within the resolution, even
 where the parts just before it cannot be proven."""
 
+PROVEN_SHARE, PROVEN_ROUNDING = 1.0 - 2.0**-38, 8.0 * ROUNDING
+"""Of a distance, and of all lengths: GJK accepts one whose proven lower bound is within 1e-12 and its rounding."""
+
 DEPTH = 80
 """Moments waiting: each halves what is left of at most 2^63 ns."""
 
@@ -175,11 +178,8 @@ def look(
 
 @leaf_kernel
 def proven_distance(distance: float, size: float) -> float:
-    """Return a lower bound on the distance [m] of two bodies that GJK says are `distance` apart, or farther than that.
-
-    GJK accepts a distance whose proven lower bound is within 1e-12 of it and its rounding, see `gjk_kernel`.
-    """
-    return distance * (1.0 - 2.0**-38) - 8.0 * ROUNDING * size
+    """Return a lower bound on the distance [m] of two bodies that are `distance` apart by GJK, or farther."""
+    return distance * PROVEN_SHARE - PROVEN_ROUNDING * size
 
 
 @kernel

@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import boolean, float64, int64, uint8
+from numba import float64, int64, uint8
 
-from replay.collision.bodies import VOLUMES_TYPE, Volumes
+from replay.collision.bodies import AABB, BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
 from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.volume_gap import boxes_gap
-from replay.numerics.arrays import Bytes, Flags, Floats, Integers
+from replay.collision.way_sieve import root_gap, root_ratio
+from replay.kinematics.linkage import POSE_ROUNDING
+from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
 COUNTS = 2
@@ -27,59 +29,81 @@ BY_FRAMES, IN_DOUBT = range(COUNTS)
 CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 """As `columns.Between`."""
 
+FAR, QUIET, NEAR = range(3)
+"""What a block may hold of a pair: no bound below the largest one that is told; nothing within the limit in any frame,
+and all intervals proven by that; or more."""
+
 
 @entry(
+    BODIES_TYPE,
     VOLUMES_TYPE,
     int64[:, ::1],
     float64[:, :, :, ::1],
     int64[:, ::1],
     float64[::1],
     float64[::1],
+    float64[::1],
     float64,
-    boolean[::1],
-    boolean[::1],
+    float64,
+    uint8[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+    float64[::1],
 )
 @leaf_kernel
-def keep_near(
+def sort_out(
+    bodies: Bodies,
     volumes: Volumes,
     pairs: Integers,
     middle: Floats,
     rows: Integers,
-    total: Floats,
+    half: Floats,
+    longest: Floats,
     rounding: Floats,
+    limit: float,
     cap: float,
-    near: Flags,
-    wanted: Flags,
+    kinds: Bytes,
+    scratch: Floats,
+    rotation: Floats,
+    translation: Floats,
 ) -> None:
-    """Find the pairs that may come nearer than `cap` in a block, by their spheres in its middle frame and their ways.
+    """Find out which pairs a block need not be looked at for, by its middle frame and the ways of its bodies.
 
     Args:
-        volumes: of all bodies.
+        bodies, volumes: of the scene.
         pairs: (P, 4) as `PairFrames.pairs`.
         middle: (Q, 1, 4, 4) T_a_b of the links in the middle frame.
         rows: (P, 4) as of `certify`.
-        total: (V,) sum of each way over the block [m].
+        half: (V,) sum of each way from the middle frame to either end of the block, the larger one [m].
+        longest: (V,) each way in the interval in which it is longest [m].
         rounding: (V,) see `ways.fill_ways`.
-        cap: [m].
-        near: (P,) out.
-        wanted: (Q,) out, the link pairs of these.
+        limit, cap: as of `certify`.
+        kinds: (P,) out, FAR, QUIET or NEAR.
+        scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
     """
-    for q in range(len(wanted)):
-        wanted[q] = False
     for p in range(len(pairs)):
-        gap = sphere_gap(volumes, pairs[p, 0], pairs[p, 1], middle[pairs[p, 2], 0])
-        way, wide = 0.0, 0.0
+        a, b, pose = pairs[p, 0], pairs[p, 1], middle[pairs[p, 2], 0]
+        gap = sphere_gap(volumes, a, b, pose)
+        way, wide, step = 0.0, 0.0, 0.0
         for k in range(2):
-            way += total[rows[p, k]] + 2.0 * rounding[rows[p, k]]
-            wide += total[rows[p, 2 + k]] + 2.0 * rounding[rows[p, 2 + k]]
-        near[p] = not gap > max(cap + way, wide)
-        if near[p]:
-            wanted[pairs[p, 2]] = True
+            way += half[rows[p, k]] + 2.0 * rounding[rows[p, k]]
+            wide += half[rows[p, 2 + k]] + 2.0 * rounding[rows[p, 2 + k]]
+            step += longest[rows[p, k]] + 2.0 * rounding[rows[p, k]]
+        kinds[p] = NEAR
+        if gap > max(cap + way, wide):
+            kinds[p] = FAR
+        elif 0.0 < limit < np.inf and volumes.kind != AABB:
+            size = (rounding[rows[p, 0]] + rounding[rows[p, 1]]) / POSE_ROUNDING
+            margin = 2.0**-43 * size
+            root = root_gap(bodies, a, b, pose, size, rotation, translation)
+            quiet = root - limit - margin > root_ratio(bodies, volumes, a, b) * way
+            quiet = quiet and 2.0 * proven_distance(limit, size) > step * (1.0 + 2.0**-40)
+            if quiet and boxes_gap(volumes, a, b, pose, rotation, scratch) > way + margin:
+                kinds[p] = QUIET
 
 
 @entry(
     VOLUMES_TYPE,
-    float64[::1],
     PAIR_FRAMES_TYPE,
     PAIR_FRAMES_TYPE,
     int64,
@@ -97,7 +121,6 @@ def keep_near(
 @leaf_kernel
 def certify(
     volumes: Volumes,
-    reach: Floats,
     frames: PairFrames,
     head: PairFrames,
     begin: int,
@@ -116,7 +139,6 @@ def certify(
 
     Args:
         volumes: of all bodies.
-        reach: (B,) of all bodies, see `bodies.Bodies`.
         frames: of n frames, decided by the narrow phase.
         head: of the frame before the first one, read if `begin` is 0.
         begin: 0, or 1 if there is no frame before the first one.
@@ -133,6 +155,7 @@ def certify(
     for p in range(len(frames.pairs)):
         a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
         way_a, way_b, wide_a, wide_b = rows[p, 0], rows[p, 1], rows[p, 2], rows[p, 3]
+        size = (rounding[way_a] + rounding[way_b]) / POSE_ROUNDING  # no less than the bodies' reach and offset
         error, wide_error = 2.0 * (rounding[way_a] + rounding[way_b]), 2.0 * (rounding[wide_a] + rounding[wide_b])
         near1, level1, unsure1, left = 0.0, 0, False, 0.0
         for f in range(begin - 1, n):
@@ -145,7 +168,6 @@ def certify(
                 clearance = frames.clearance[f, p]
             near1 = 0.0
             if level1 < 2:
-                size = reach[a] + reach[b] + abs(pose[0, 3]) + abs(pose[1, 3]) + abs(pose[2, 3])
                 near1 = max(proven_distance(limit if math.isnan(clearance) else clearance, size), 0.0)
             if f < begin:
                 continue

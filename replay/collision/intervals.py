@@ -11,16 +11,16 @@ from replay.collision import crossing_search, interval_proof
 from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
-from replay.collision.crossing_search import Questions
+from replay.collision.crossing_search import PROVEN_ROUNDING, PROVEN_SHARE, Questions
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_steps import Chains
 from replay.collision.ways import fill_ways, first_ways
-from replay.kinematics.linkage import Linkage, LinkPoses
+from replay.kinematics.linkage import POSE_ROUNDING, Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
-from replay.numerics.arrays import Bytes, Flags, Floats, Integers
+from replay.numerics.arrays import Bytes, Floats, Integers
 
 RESOLUTION = 1_000
 """Longest bracket of a moment that is aimed at [ns]."""
@@ -44,9 +44,11 @@ class Course:
     rounding: Floats
 
     @cached_property
-    def total(self) -> Floats:
-        """The sum of each way over the block [m]."""
-        return np.add.accumulate(self.ways, axis=1)[:, -1] * (1.0 + 2.0**-40)
+    def sums(self) -> tuple[Floats, Floats]:
+        """Each way from the block's middle frame to its ends, the larger one, and in its longest interval (V,) [m]."""
+        middle = (self.ways.shape[1] + 1) // 2
+        parts = [self.ways[:, :middle].sum(axis=1), self.ways[:, middle:].sum(axis=1)]
+        return np.maximum(*parts) * (1.0 + 2.0**-40), self.ways.max(axis=1, initial=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +108,18 @@ class Intervals:
         m = len(time) - 1
         travel = np.zeros((len(self._linkage.links), m, 2))
         link_travel(self._line, time / 1e9, travel)
-        ways, rounding = np.empty((self._first[-1], m)), np.empty(self._first[-1])
-        points, local = np.empty((m + 1, 3)), np.ascontiguousarray(poses.local)
-        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, points, ways, rounding)
-        return Course(time, first + 1 - lead, 1 - lead, ways, rounding)
+        return self._course(np.ascontiguousarray(poses.local), travel, time, first + 1 - lead, 1 - lead)
 
-    def still(self) -> Course:
-        """Return a course on which nothing moves, of one frame."""
-        time = np.zeros(2, dtype=np.int64)
-        return Course(time, 0, 0, np.zeros((self._first[-1], 1)), np.zeros(self._first[-1]))
+    def _course(self, local: Floats, travel: Floats, time: Integers, first: int, begin: int) -> Course:
+        ways, rounding = np.empty((self._first[-1], len(local) - 1)), np.empty(self._first[-1])
+        points = np.empty((len(local), 3))
+        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, points, ways, rounding)
+        return Course(time, first, begin, ways, rounding)
+
+    def still(self, poses: LinkPoses) -> Course:
+        """Return a course of one interval on which nothing moves from the first of some poses."""
+        travel = np.zeros((len(self._linkage.links), 1, 2))
+        return self._course(np.repeat(poses.local[:1], 2, axis=0), travel, np.zeros(2, dtype=np.int64), 0, 0)
 
     def clear(self, shape: tuple[int, int], course: Course) -> tuple[Bytes, Floats]:
         """Return the columns of pairs that are clear and farther apart than the largest bound that is told."""
@@ -137,10 +142,10 @@ class Intervals:
         near = self._first[pairs] + shared[:, None]
         return np.concatenate([near, self._first[pairs] if self._volumes.kind == AABB else near], axis=1)
 
-    def near(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> tuple[Flags, Flags]:
-        """Return which pairs (P,) may be nearer in a block than the largest bound told, and their link pairs (Q,).
+    def sorted_out(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> Bytes:
+        """Return what a block may hold of pairs (P,): `interval_proof.FAR`, QUIET or NEAR.
 
-        The rest is clear in and between all frames.
+        Those that are not NEAR are clear in all its frames and intervals.
 
         Args:
             pairs: (P, 4) as `PairFrames.pairs`.
@@ -148,11 +153,34 @@ class Intervals:
             rows: of `Course.ways`.
             course: of the block.
         """
-        near, wanted = np.ones(len(pairs), dtype=bool), np.ones(len(middle), dtype=bool)
-        interval_proof.keep_near(
-            self._volumes, pairs, middle, rows, course.total, course.rounding, self._cap, near, wanted
+        kinds = np.empty(len(pairs), dtype=np.uint8)
+        half, longest = course.sums
+        scratch = np.zeros((8, 4)), np.empty((3, 3)), np.empty(3)
+        interval_proof.sort_out(
+            self._bodies,
+            self._volumes,
+            pairs,
+            middle,
+            rows,
+            half,
+            longest,
+            course.rounding,
+            self._limit,
+            self._cap,
+            kinds,
+            *scratch,
         )
-        return near, wanted
+        return kinds
+
+    def quiet(self, rows: Integers, course: Course) -> Floats:
+        """Return the bounds (m, c) of QUIET pairs over the m intervals of a block, as `certify` has them."""
+        way = course.ways[rows[:, 0]] + course.ways[rows[:, 1]]
+        error = 2.0 * (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]])
+        size = (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]]) / POSE_ROUNDING
+        near = np.maximum(self._limit * PROVEN_SHARE - PROVEN_ROUNDING * size, 0.0)
+        least = 0.5 * (near[:, None] + near[:, None] - np.where(way > 0.0, way + error[:, None], way))
+        bound: Floats = np.minimum(np.maximum(least, 0.0), self._cap).T
+        return bound
 
     def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:
         """Return what is known of pairs that were decided in all frames of a block, and in the frame before it."""
@@ -163,7 +191,6 @@ class Intervals:
         head = frames if head is None else head
         interval_proof.certify(
             self._volumes,
-            self._bodies.reach,
             frames,
             head,
             course.begin,

@@ -268,20 +268,20 @@ class CollisionPipeline:
         if n == 0 or self._pairs.count == 0:
             return
         if self._static is None:
-            still = None if self._intervals is None else self._intervals.still()
             one = poses.slice(0, 1)
+            still = None if self._intervals is None else self._intervals.still(one)
             self._static = []
             if self._pairs.static_count:
                 fixed = self._candidates(one, still).fixed()
                 self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
-                self._static = [self._work(batch, one, 0, still) for batch in self._batches(fixed)]
+                self._static = [found for batch in self._batches(fixed) for found in self._work(batch, one, 0, still)]
         self.counters.static += n * self._pairs.static_count
         yield from self._static
         if self._all is None:
             moving = self._candidates(poses, course).moving()
             self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
         for batch in self._always if self._all is not None else self._batches(moving):
-            yield self._work(batch, poses, lead, course)
+            yield from self._work(batch, poses, lead, course)
 
     def _candidates(self, poses: LinkPoses, course: Course | None) -> Selected:
         if self._all is not None:
@@ -291,49 +291,60 @@ class CollisionPipeline:
             reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> _Found:
-        rows, columns, ways, known, n = batch.rows, batch.columns, batch.ways, None, len(poses.local)
-        wanted = None
-        if course is not None and self._intervals is not None:
-            middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
-            near, wanted = self._intervals.near(rows, middle, ways, course)
-            if self._savings:
-                self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
-                rows, columns, ways = rows[near], columns[near], ways[near]
-            else:
-                wanted = None
+    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
+        """Yield what is found of a batch's pairs in a block."""
+        rows, columns, ways, n = batch.rows, batch.columns, batch.ways, len(poses.local)
+        if course is None or self._intervals is None:
+            frames = self._decided(self.narrow_phase, batch, rows, poses)
+            yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, None)
+            return
+        middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
+        kinds = self._intervals.sorted_out(rows, middle, ways, course)
+        near = kinds == interval_proof.NEAR
+        if self._savings:
+            quiet = kinds == interval_proof.QUIET
+            if self._own is not None:  # what the other engine says of them at the frames is not known
+                near, quiet = near | quiet, np.zeros_like(quiet)
+            self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
+            yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(ways[quiet], course))
+            columns, rows, ways = columns[near], rows[near], ways[near]
         shown, first = poses.slice(lead, n), poses.slice(0, 1)
-        engine = self.narrow_phase
-        frames = self._decided(engine, batch, rows, wanted, shown, (ways, course))
-        if course is not None and self._intervals is not None:
-            head = self._decided(engine, batch, rows, wanted, first, (ways, None)) if lead else None
-            told, before = frames, head
-            if self._own is not None:
-                mine = self._decided(self._own, batch, rows, wanted, shown, (ways, course))
-                told = frames._replace(clearance=mine.clearance)
-                if head is not None:
-                    mine = self._decided(self._own, batch, rows, wanted, first, (ways, None))
-                    before = head._replace(clearance=mine.clearance)
-            known = self._intervals.answer(told, before, ways, course)
-            if not self._savings:  # as it is told where these are not looked at
-                known.bound[(known.between == Between.CLEAR) & ~near] = self._cap
-        return _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+        frames = self._decided(self.narrow_phase, batch, rows, shown, ways, course)
+        head = self._decided(self.narrow_phase, batch, rows, first) if lead else None
+        told, before = frames, head
+        if self._own is not None:
+            told = frames._replace(clearance=self._decided(self._own, batch, rows, shown).clearance)
+            if head is not None:
+                before = head._replace(clearance=self._decided(self._own, batch, rows, first).clearance)
+        known = self._intervals.answer(told, before, ways, course)
+        if not self._savings:  # as it is told where these are not looked at
+            known.bound[(known.between == Between.CLEAR) & (kinds == interval_proof.FAR)] = self._cap
+        yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+
+    def _clear(self, columns: Integers, rows: Integers, bound: Floats) -> _Found:
+        """Return what is found of pairs that are clear in all of a block, with bounds (m, c) of its intervals."""
+        shape = 1, len(columns)
+        return _Found(
+            columns,
+            rows[:, :2],
+            np.zeros(shape, dtype=np.uint8),
+            np.full(shape, np.nan),
+            np.zeros(shape, dtype=bool),
+            Known(np.full(shape, Between.CLEAR, dtype=np.uint8), bound, Crossings.none()),
+        )
 
     def _decided(
         self,
         engine: NarrowPhase,
         batch: _Batch,
         rows: Integers,
-        wanted: Flags | None,
         poses: LinkPoses,
-        moving: tuple[Integers, Course | None],
+        ways: Integers | None = None,
+        course: Course | None = None,
     ) -> PairFrames:
-        """Return what is found of some of a batch's pairs, whose link pairs are wanted, in frames.
-
-        Args:
-            engine, batch, rows, wanted, poses: see above.
-            moving: the pairs' rows of ways, and the course on which the frames lie, None if it is not known.
-        """
+        """Return what an engine finds of some of a batch's pairs in frames; by their ways if the course is known."""
+        wanted = np.zeros(batch.relative.count, dtype=bool)
+        wanted[rows[:, 2]] = True
         relative = batch.relative.of(poses.local, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
@@ -342,8 +353,7 @@ class CollisionPipeline:
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
         limit = self._limit
-        ways, course = moving
-        if self._savings and course is not None and not self._uses_world and self._own is None:
+        if self._savings and ways is not None and course is not None and not self._uses_world and self._own is None:
             way_sieve.sieve_by_way(
                 self._bodies,
                 self._volumes,

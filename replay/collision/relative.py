@@ -51,6 +51,11 @@ class RelativePoses:
         self._ways = np.stack([_rows(parents, keys, order), keys % count], axis=1)
         self._pairs = np.ascontiguousarray(_rows(wanted, keys, order))
 
+    @property
+    def count(self) -> int:
+        """How many link pairs there are."""
+        return len(self._pairs)
+
     def of(self, local: Floats, wanted: Flags | None = None) -> Floats:
         """Return T_a_b (Q, n, 4, 4) of the Q link pairs.
 

@@ -75,7 +75,7 @@ def sieve_by_way(
         a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
         way_a, way_b = rows[p, 0], rows[p, 1]
         error = 2.0 * (rounding[way_a] + rounding[way_b])
-        ratio = math.sqrt(3.0) * max(1.0, _ratio(bodies, volumes, a), _ratio(bodies, volumes, b))
+        ratio = root_ratio(bodies, volumes, a, b)
         left, quiet = 0.0, True
         for f in range(level.shape[0]):
             if f > 0:
@@ -98,14 +98,14 @@ def sieve_by_way(
                 counts[BY_SPHERE] += 1
                 if quiet and limit > 0.0:
                     left = (
-                        min(gap, (_root_gap(bodies, a, b, pose, size, rotation, translation) - limit) / ratio) - margin
+                        min(gap, (root_gap(bodies, a, b, pose, size, rotation, translation) - limit) / ratio) - margin
                     )
                 elif quiet:
                     left = gap - margin
             elif volumes_meet(volumes, a, b, pose, frames.turns[0, f], scratch):
                 level[f, p], task[f, p], quiet = 1, RUN, False
             elif limit > 0.0:
-                root = _root_gap(bodies, a, b, pose, size, rotation, translation)
+                root = root_gap(bodies, a, b, pose, size, rotation, translation)
                 if quiet and root > limit:
                     counts[BY_VOLUME] += 1
                     left = (
@@ -120,6 +120,12 @@ def sieve_by_way(
 
 
 @leaf_kernel
+def root_ratio(bodies: Bodies, volumes: Volumes, a: int, b: int) -> float:
+    """Return by how much a way that bodies take may shorten the gap of the boxes at their roots: sqrt(3) k."""
+    return math.sqrt(3.0) * max(1.0, _ratio(bodies, volumes, a), _ratio(bodies, volumes, b))
+
+
+@leaf_kernel
 def _ratio(bodies: Bodies, volumes: Volumes, body: int) -> float:
     """Return how much larger a sphere about the body's centre is that holds the box at the root of its tree."""
     row, square, away = bodies.node_first[body], 0.0, 0.0
@@ -131,9 +137,7 @@ def _ratio(bodies: Bodies, volumes: Volumes, body: int) -> float:
 
 
 @leaf_kernel
-def _root_gap(
-    bodies: Bodies, a: int, b: int, pose: Floats, size: float, rotation: Floats, translation: Floats
-) -> float:
+def root_gap(bodies: Bodies, a: int, b: int, pose: Floats, size: float, rotation: Floats, translation: Floats) -> float:
     """Return what `traversal.closest` computes of the boxes at the roots [m]."""
     for i in range(3):
         translation[i] = pose[i, 3]
