@@ -14,6 +14,8 @@ from replay.kinematics.profiles import from_pieces, through_waypoints, trapezoid
 from replay.numerics import transforms
 from tests.amounts import cases
 
+LOGGED = Track(np.arange(3.0), np.zeros(3))
+
 
 def linkage(*joints: Joint) -> Linkage:
     return Linkage([Link(f"link_{joint.name}", None, transforms.identity(), joint) for joint in joints])
@@ -164,6 +166,8 @@ def test_a_limit_is_exceeded_by_no_more_than_rounding(excess, accepted, sign):
         (Script(moves=(Move({"hinge": 1.0}, speed=1.5),)), "above 0 and at most 1"),
         (Script(points={"hinge": (Waypoint(0, 0),)}, moves=(Move({"hinge": 1.0}),)), "keep one of the two"),
         (Script(free={"hinge": ()}), "names no free joint"),
+        (Script(points={"hinge": (Waypoint(0, 0),)}, recorded={"hinge": LOGGED}), "moved by motion.points or moves"),
+        (Script(moves=(Move({"hinge": 1.0}),), recorded={"hinge": LOGGED}), "moved by motion.points or moves"),
     ],
 )
 def test_a_script_that_makes_no_sense_says_what_would(script, message):
