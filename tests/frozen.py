@@ -7,6 +7,7 @@ the frames in which they change. What two readings may be apart is what scenario
 
 import functools
 import json
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,13 @@ import numpy as np
 from replay.collision.columns import Level
 from replay.comparison.numbers import compare_numbers
 from replay.comparison.rules_file import read_rules
-from replay.comparison.signals import groups
+from replay.comparison.signals import BETWEEN_FRAMES, groups
 from replay.numerics.columns import Kind
+from replay.recording.reader import read
+from replay.recording.record import record
 from replay.scenario.load import load
 from replay.scenario.methods import METHOD_REVISIONS, Model
 from replay.scenario.scene import build
-from replay.simulation import Simulation
 
 FOLDER = Path(__file__).parent / "data" / "frozen"
 READINGS = FOLDER / "readings.json"
@@ -30,18 +32,18 @@ SCENE = "scene"
 
 
 @functools.cache
-def simulation_of(method):
-    """The scene under a version of a method, such as "distance.rays"; defaults for all else."""
+def recording_of(method):
+    """The scene, recorded under a version of a method, such as "distance.rays"; defaults for all else."""
     kind, *option = method.split(".")
     choice = {option[0]: option[1]} if len(option) == 2 else {"method": "".join(option)}
     model = Model.model_validate({} if method == SCENE else {kind: choice})
-    return Simulation(build(load(FOLDER / "scene.yaml"), model=model))
+    with tempfile.TemporaryDirectory() as folder:
+        return read(record(load(FOLDER / "scene.yaml"), folder, model=model, rrd=False).mcap)
 
 
 def signals_of(method):
     """All signals of the scene: full name, values (F,), and whether they are states."""
-    (block,) = simulation_of(method).blocks()
-    for group in groups(block):
+    for group in groups(recording_of(method)):
         for column, signal in enumerate(group.signals):
             values = group.values[:, column]
             if group.field.kind is Kind.ROTATION:
@@ -64,6 +66,10 @@ def depends(method, name, values):
         return None
     if family == "collision.bounds":
         return values >= Level.BOUNDS if field == "level" else None
+    if (family == "collision.between") != (field in BETWEEN_FRAMES):
+        return None
+    if family == "collision.between":
+        return values
     if any(shape in pair[0] for shape in CONCAVE) != (family == "collision.pieces"):
         return None
     return values == Level.CONTACT if field == "level" else values
@@ -87,7 +93,7 @@ def readings(method):
         if part is not None and not rules.tolerance(name).ignore:
             found[name] = kept(part, states)
     if method == SCENE:
-        for shape in simulation_of(SCENE).scene.shapes:
+        for shape in build(load(FOLDER / "scene.yaml")).shapes:
             corners = shape.solid.triangles
             found[f"corners of {shape.name}"] = [len(corners), *corners.std(axis=(0, 1)).round(12).tolist()]
     return found

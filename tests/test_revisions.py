@@ -10,7 +10,10 @@ from replay.scenario.methods import METHOD_REVISIONS
 from tests import frozen
 
 READINGS = json.loads(frozen.READINGS.read_text())
-CAUSES = {"collision.pieces": ("collision.narrowphase.gjk",)}
+CAUSES = {
+    "collision.pieces": ("collision.narrowphase.gjk",),
+    "collision.between": ("collision.narrowphase.gjk", "collision.pieces.exact"),
+}
 """What else, when it changes, changes a family's readings."""
 
 

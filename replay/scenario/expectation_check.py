@@ -14,7 +14,7 @@ from replay.collision.columns import CollisionColumns, Level
 from replay.language.fields import Part
 from replay.language.node import Place
 from replay.numerics.arrays import Floats, Integers
-from replay.scenario.expectations import Between, PairExpectation
+from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.meetings import Clearances, Meetings, Seen, seen
 from replay.scenario.names import matches
@@ -117,7 +117,7 @@ class ExpectationCheck:
 
             return take
 
-        if isinstance(expected.contact, Between):
+        if isinstance(expected.contact, BetweenPart):
             begin, end = expected.contact.between
             window = (round(begin * 1e9), round(end * 1e9))
             text = f"{about}: contact begins between {begin:.6g} s and {end:.6g} s"

@@ -13,7 +13,7 @@ from replay.scenario.collision import GlobPair
 from replay.sensing.kinds import KINDS
 
 
-class Between(Part):
+class BetweenPart(Part):
     """A window of time, both ends included."""
 
     between: tuple[Time, Time]
@@ -27,11 +27,11 @@ class Between(Part):
 
 
 def _window_or_word(value: Any) -> str:
-    return "a window" if isinstance(value, dict | Between) else "a word"
+    return "a window" if isinstance(value, dict | BetweenPart) else "a word"
 
 
 Contact = Annotated[
-    Annotated[When, Tag("a word")] | Annotated[Between, Tag("a window")],
+    Annotated[When, Tag("a word")] | Annotated[BetweenPart, Tag("a window")],
     Discriminator(_window_or_word),
 ]
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, mod
 from replay.language.fields import Name, Part, Text, Title, rejected
 from replay.language.units import Dimensioned, Duration, Rate
 from replay.scenario.collision import CollisionPart
-from replay.scenario.expectations import Between, Expectation, PairExpectation
+from replay.scenario.expectations import BetweenPart, Expectation, PairExpectation
 from replay.scenario.links import LinkPart
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.motion import MotionPart, MovePart, Positions
@@ -74,7 +74,7 @@ class Scenario(Fragment):
     def _windows_begin_in_time(self) -> Self:
         for index, expected in enumerate(self.expect):
             window = expected.contact if isinstance(expected, PairExpectation) else None
-            if isinstance(window, Between) and window.between[0] > self.duration:
+            if isinstance(window, BetweenPart) and window.between[0] > self.duration:
                 end = f"{float(self.duration):.6g} s"
                 raise rejected(f"is after the scenario's end at {end}", at=("expect", index, "contact", "between", 0))
         return self

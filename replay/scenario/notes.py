@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
-from replay.scenario.expectations import Between, PairExpectation
+from replay.scenario.expectations import BetweenPart, PairExpectation
 
 if TYPE_CHECKING:
     from replay.collision.pairs import CollisionBody
@@ -44,7 +44,7 @@ def notes(
     found.extend(_short_logs(scenario))
     for index, expected in enumerate(scenario.expect):
         window = expected.contact if isinstance(expected, PairExpectation) else None
-        if isinstance(window, Between) and window.between[1] > end:
+        if isinstance(window, BetweenPart) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
     if (model or scenario.model).collision.between == "sampled":
         from replay.scenario.scene import primitive_solids
