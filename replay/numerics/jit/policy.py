@@ -14,6 +14,7 @@ import numba
 from numba.core import config
 
 from replay.numerics.jit import compiler, progress, store
+from replay.numerics.jit.plain import plain
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -63,7 +64,7 @@ def inlined_kernel(function: Function) -> Function:
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     if _settings.DISABLE_JIT:
-        return function
+        return plain(function)
     if compiler.AVAILABLE:
         wanted = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return compiler.KernelDispatcher(function, targetoptions={**wanted, **_OPTIONS, **options})
