@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from replay.numerics import remarks
 from replay.numerics.jit import progress
 from tests.amounts import COMPILED, KERNEL_ROOMS, cases, few_of_many
 
@@ -14,7 +15,8 @@ settings.register_profile("soak", deadline=None, print_blob=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    progress.tell_by(lambda state: None, lambda text: None)  # else it would be in what tests read on stderr
+    progress.tell_by(lambda state: None)  # else it would be in what tests read on stderr
+    remarks.tell_by(lambda text: None)
     settings.load_profile("soak" if config.option.markexpr == "soak" else "seeded")
     if not COMPILED:
         np.seterr(all="ignore")  # compiled kernels go on with infinities and NaN, and say nothing

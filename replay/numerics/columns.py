@@ -11,7 +11,7 @@ import enum
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self, get_args, get_type_hints
+from typing import Any, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ class Field:
 
     Attributes:
         name: as it stands in messages and in a signal's full name.
-        kind: how its values are compared; of `Columns` it follows from their type.
+        kind: how its values are compared; of `Columns` it follows from their type, but for states that have no order.
         unit: of its values; "" when they have none.
         gate: the field that says whether this one has a value at all, such as `status` for `distance`. In frames in
             which the gates of two runs disagree, the gate's event is the difference and this field's is its echo.
@@ -56,7 +56,8 @@ class Field:
         beam: it is a point in world coordinates, drawn at the end of a line from its sensor.
         type: of the values.
         most: largest value of one that counts or is a state; what its type or `states` allow when left out.
-        nothing: the value when there is nothing to tell.
+        nothing: the value when there is nothing to tell; of `Columns` it follows from the type unless it is a state.
+        since: version of the recording format that first holds it; the column of an older recording is None.
     """
 
     name: str = ""
@@ -76,17 +77,23 @@ class Field:
     type: np.dtype[Any] = dataclasses.field(default_factory=lambda: np.dtype(np.float64))
     most: int = 0
     nothing: float = np.nan
+    since: int = 1
 
 
 class Columns:
-    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`."""
+    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`; others are none."""
 
     @classmethod
     @functools.cache
     def fields(cls) -> tuple[Field, ...]:
         """Return the description of each column, in order."""
         hints = get_type_hints(cls, include_extras=True)
-        return tuple(_described(field.name, *get_args(hints[field.name])) for field in dataclasses.fields(cls))  # type: ignore[arg-type]
+        columns = (field.name for field in dataclasses.fields(cls) if hasattr(hints[field.name], "__metadata__"))  # type: ignore[arg-type]
+        return tuple(_described(name, *get_args(hints[name])) for name in columns)
+
+    def present(self) -> tuple[Field, ...]:
+        """Return the description of each column that there is, in order: an older recording may lack some."""
+        return tuple(field for field in self.fields() if getattr(self, field.name) is not None)
 
     @classmethod
     def nothing(cls, frames: int, sensors: int, **counts: int) -> Self:
@@ -100,21 +107,23 @@ class Columns:
 
 def _described(name: str, array: Any, field: Field) -> Field:
     """Return the description of a column, with what follows from its name and type."""
+    array = next(part for part in (*get_args(array), array) if get_origin(part) is np.ndarray)  # X of "X | None"
     dtype = np.dtype(get_args(get_args(array)[1])[0])
     kinds = {"f": Kind.NUMBER, "b": Kind.FLAG}
     most = max(field.states) if field.states else field.most
     if not most and dtype.kind != "f":
         most = 1 if dtype.kind == "b" else int(np.iinfo(dtype).max)
-    nothing = {"f": np.nan, "i": -1}
+    nothing = {"f": np.nan, "i": -1}.get(dtype.kind, 0)
+    unordered = field.states is not None and field.kind is Kind.CATEGORY
     return dataclasses.replace(
         field,
         name=name,
-        kind=Kind.LEVEL if field.states else kinds.get(dtype.kind, Kind.CATEGORY),
+        kind=Kind.LEVEL if field.states and not unordered else kinds.get(dtype.kind, Kind.CATEGORY),
         label=field.label or name.replace("_", " "),
         begins=field.begins or tuple(field.events),
         most=most,
         type=dtype,
-        nothing=nothing.get(dtype.kind, 0),
+        nothing=nothing if np.isnan(field.nothing) else field.nothing,
     )
 
 

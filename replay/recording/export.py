@@ -17,7 +17,6 @@ import numpy as np
 
 from replay import limits
 from replay.errors import InvalidValue, LimitError
-from replay.kinematics.linkage import WORLD
 from replay.language.globs import fits
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
@@ -26,6 +25,7 @@ from replay.numerics.arrays import Column
 from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
+from replay.recording.topics import world_frame
 from replay.sensing.kinds import KINDS
 from replay.simulation import Layout
 
@@ -43,27 +43,28 @@ def tables(recording: Recording) -> dict[str, Table]:
     for joint, (name, unit) in enumerate(zip(layout.joints, layout.joint_units, strict=True)):
         result["/joint_states"][f"{name} position [{unit}]"] = recording.joint_positions[:, joint]
         result["/joint_states"][f"{name} velocity [{unit}/s]"] = recording.joint_velocities[:, joint]
+    world = world_frame(layout)
     for link, name in enumerate(layout.links):
-        place = f"{name} in {WORLD}"
+        place = f"{name} in {world}"
         _vector(result["/tf"], place, " [m]", recording.link_poses[:, link, :3, 3], "xyz")
         _vector(result["/tf"], f"{place} quat", "", recording.link_quaternions[:, link], "xyzw")
     if recording.collision is not None:
         result["/collision"] = dict(time)
         for pair, name in enumerate(layout.pairs):
-            for field in recording.collision.fields():
+            for field in recording.collision.present():
                 values = getattr(recording.collision, field.name)[:, pair]
                 _add(result["/collision"], f"{name} {field.label}", field, values, layout)
     for kind, columns in recording.readings.items():
         for sensor, name in enumerate(layout.sensors[kind]):
             table = result[KINDS[kind].topic(name)] = dict(time)
-            for field in columns.fields():
+            for field in columns.present():
                 values = getattr(columns, field.name)[:, sensor]
                 for k, each in enumerate(getattr(layout, field.each) if field.each else ()):
                     _add(table, f"{each} {field.label}", field, values[:, k], layout)
                 if not field.each:
                     _add(table, field.label, field, values, layout)
     events = recording.events.columns()
-    result["/events"] = {"time [ns]": events.pop("time"), **events}
+    result["/events"] = {f"{name} [ns]" if name in ("time", "earliest") else name: events[name] for name in events}
     return result
 
 

@@ -22,12 +22,12 @@ import replay
 from replay import limits
 from replay.errors import LimitError, RecordingError
 from replay.json_text import read_json, typed
-from replay.simulation import BLOCK_FRAMES, Layout
+from replay.simulation import BLOCK_FRAMES, Layout, block_frames
 
-FORMAT = 1
+FORMAT = 2
 """Version of the recording format that is written."""
-READABLE_FORMATS = (1,)
-"""Versions that are read: the one that is written and, once there is one, the one before."""
+READABLE_FORMATS = (1, 2)
+"""Versions that are read: the one that is written and the one before."""
 RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
 WITHOUT_RESULTS = ("bench", "cli")
@@ -181,6 +181,7 @@ def describe(
         code=code_identity(),
         version=replay.__version__,
         libraries=library_versions(),
+        block_frames=block_frames(len(layout.pairs)),
         originals=originals or {},
     )
 

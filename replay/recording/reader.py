@@ -37,7 +37,8 @@ class Recording:
     """A whole recording: the columns of `FrameBlock` for all F frames.
 
     Every number is the one that was written, bit by bit, except `link_poses`: a pose is stored as translation and
-    unit quaternion (`link_quaternions`), and its rotation matrix is computed again from that.
+    unit quaternion (`link_quaternions`), and its rotation matrix is computed again from that. A column that the format
+    of an older recording does not have is None. `collision.crossings` are empty: the events tell them.
 
     Attributes:
         path: the file.
@@ -257,8 +258,13 @@ class _Assembly:
             return -1, len(getattr(self._layout, field.names)) - 1
         return (-1 if field.type.kind == "i" else 0), field.most
 
-    def _field(self, topic: Topic, field: Field) -> NDArray[Any]:
-        """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n)."""
+    def _field(self, topic: Topic, field: Field) -> NDArray[Any] | None:
+        """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n).
+
+        None of one that the format of the recording does not have.
+        """
+        if field.since > self._provenance.format:
+            return None
         if field.letters:
             return np.stack([self._column(topic, f"{field.name}.{c}", field) for c in field.letters], axis=1)
         count = len(getattr(self._layout, field.each)) if field.each else None
@@ -274,18 +280,22 @@ class _Assembly:
         if "/collision" not in self._topics:
             return None
         topic = self._topic("/collision")
-        return CollisionColumns(**{field.name: self._field(topic, field) for field in CollisionColumns.fields()})
+        columns: dict[str, Any] = {field.name: self._field(topic, field) for field in CollisionColumns.fields()}
+        return CollisionColumns(**columns)
 
     def _readings(self) -> dict[str, Any]:
         found = {}
         for kind, names in self._layout.sensors.items():
             topics = [self._topics[topic] for topic in map(KINDS[kind].topic, names) if topic in self._topics]
-            columns = KINDS[kind].columns
             if topics:
-                found[kind] = columns(
-                    **{f.name: np.stack([self._field(t, f) for t in topics], axis=1) for f in columns.fields()}
-                )
+                columns = KINDS[kind].columns
+                found[kind] = columns(**{field.name: self._of_sensors(topics, field) for field in columns.fields()})
         return found
+
+    def _of_sensors(self, topics: list[Topic], field: Field) -> NDArray[Any] | None:
+        values = [self._field(topic, field) for topic in topics]
+        present = [value for value in values if value is not None]
+        return np.stack(present, axis=1) if present else None
 
     def _events(self) -> Events:
         if not self._with_events:

@@ -1,9 +1,9 @@
-"""What a reader should know of a scenario although it is valid: what its end cuts off, and logs that end before it."""
+"""What a reader should know of a scenario although it is valid: what its end cuts off, short logs, what frames miss."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,21 @@ from replay.scenario.expectations import Between, PairExpectation
 
 if TYPE_CHECKING:
     from replay.collision.pairs import CollisionBody
+    from replay.geometry.solid import Solid
+    from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
 
 
-def notes(scenario: Scenario) -> list[Problem]:
-    """Return the notes on a scenario, each with its place."""
+def notes(
+    scenario: Scenario, *, model: Model | None = None, solids: Mapping[tuple[str, str], Solid] | None = None
+) -> list[Problem]:
+    """Return the notes on a scenario, each with its place.
+
+    Args:
+        scenario: as loaded.
+        model: replaces the scenario's own.
+        solids: shapes by link and name, in the links' frames; all that need no mesh file when left out.
+    """
     end = float(scenario.duration)
     after = f"after the scenario's end at {end:.6g} s"
     problem = scenario.provenance.problem
@@ -36,6 +46,11 @@ def notes(scenario: Scenario) -> list[Problem]:
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, Between) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    if (model or scenario.model).collision.between == "sampled":
+        from replay.scenario.scene import primitive_solids
+        from replay.scenario.speed_notes import speed_notes
+
+        found.extend(speed_notes(scenario, primitive_solids(scenario) if solids is None else solids))
     return found
 
 
@@ -59,6 +74,17 @@ def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:
     return found
 
 
+def touching_note(pairs: Sequence[str]) -> list[str]:
+    """Return what is said of pairs "link/shape|link/shape" in contact in the first frame, and YAML to disable them."""
+    verb = "is" if len(pairs) == 1 else "are"
+    rule = f"{verb} in contact in the first frame; where they may be, write below collision.disable:"
+    sides = (pair.split("|") for pair in pairs)
+    return [
+        f"{count(len(pairs), 'pair')} {rule}",
+        *(f"    - {{pair: [{a}, {b}], reason: in contact from the first frame}}" for a, b in sides),
+    ]
+
+
 def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     """Yield the last move of each joint that still moves at the end, and when it ends [s]."""
     from replay.kinematics.motion import joint_profiles
@@ -67,10 +93,11 @@ def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     moves = scenario.motion.moves
     profiles = joint_profiles(linkage(scenario), script(scenario)) if moves else {}
     late: dict[int, float] = {}
-    for joint in {name for move in moves for name in move.to}:
+    targets = [scenario.target(move) for move in moves]
+    for joint in {name for target in targets for name in target}:
         seconds = max(profiles[joint].end, default=0.0)
         if seconds > end + 1e-9:
-            index = max(index for index, move in enumerate(moves) if joint in move.to)
+            index = max(index for index, target in enumerate(targets) if joint in target)
             late[index] = max(seconds, late.get(index, 0.0))
     yield from sorted(late.items())
 

@@ -395,7 +395,7 @@ def test_public_diff_takes_recordings_and_files(tmp_path):
     found = replay.diff(baseline, made_up.write(same_readings, tmp_path / "b.mcap"))
     assert found.verdict is DiffVerdict.SAME
     assert found.provenance
-    assert found.compared == 55
+    assert found.compared == 59
     grown = replay.diff(baseline, made_up.write(BASELINE, tmp_path / "c.mcap", size=1.5))
     assert [change.name for change in grown.scene] == ["/scene/arm/beam", "/scene/stand/base", "/scene/stand/column"]
     assert grown.verdict is DiffVerdict.DIFFERENT

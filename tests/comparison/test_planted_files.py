@@ -291,6 +291,6 @@ def test_one_extra_pair_of_real_runs(tmp_path, capsys):
     assert run(["diff", *map(str, files)]) is ExitCode.DIFFERENT
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if not line.startswith(("  provenance", "    "))] == [
-        "different: s: 4 signals extra, 1 difference of provenance",
-        "  extra: /collision arm/rod|post/pole (4 signals)",
+        "different: s: 6 signals extra, 1 difference of provenance",
+        "  extra: /collision arm/rod|post/pole (6 signals)",
     ]
