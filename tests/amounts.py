@@ -6,7 +6,7 @@ and the marker `compiled` for what is about compiling or needs bodies of thousan
 
 from collections.abc import Sequence
 
-from numba.core import config
+from numba import config
 
 COMPILED = not config.DISABLE_JIT
 """Whether kernels are compiled; NUMBA_DISABLE_JIT=1 runs them as they stand there, for a debugger."""

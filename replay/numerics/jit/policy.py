@@ -12,6 +12,7 @@ import numba
 from numba import config
 
 from replay.numerics.jit import compiler, store
+from replay.numerics.jit.plain import plain
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -56,7 +57,7 @@ def inlined_kernel(function: Function) -> Function:
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     if _settings.DISABLE_JIT:
-        return function
+        return plain(function)
     if compiler.AVAILABLE:
         wanted = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return compiler.KernelDispatcher(function, targetoptions={**wanted, **_OPTIONS, **options})
