@@ -22,11 +22,19 @@ if TYPE_CHECKING:
     from replay.scenario.scene import Scene
     from replay.sensing.kind import Suite
 
-__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "simulate"]
+__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "block_frames", "simulate"]
 
 
 BLOCK_FRAMES = 256
-"""Frames per block; recorded, because warm-start state resets at block starts."""
+"""Most frames per block."""
+
+PAIR_FRAMES = 1 << 23
+"""Most pairs times frames of a block: results are 20 bytes each, 160 MiB."""
+
+
+def block_frames(pairs: int) -> int:
+    """Return how many frames the blocks of a scene have; recorded, because warm-start state resets at block starts."""
+    return max(1, min(BLOCK_FRAMES, PAIR_FRAMES // max(pairs, 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +85,7 @@ class Simulation:
         from replay.kinematics.motion import plan
 
         self.scene = scene
+        self._block_frames = block_frames(len(scene.pairs))
         self._motion = plan(scene.linkage, scene.script)
         self._proven = scene.model.collision.between == "proven"
         self.collision = _collision(scene, self._motion if self._proven else None)
@@ -91,7 +100,7 @@ class Simulation:
 
     def block(self, first: int) -> FrameBlock:
         """Return the block that begins at a frame; it depends on no other block."""
-        last = min(first + BLOCK_FRAMES, self.scene.frames)
+        last = min(first + self._block_frames, self.scene.frames)
         lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
         time = self.scene.time_ns(first - lead, last)
         states = self._motion.states(time / 1e9)
@@ -110,14 +119,14 @@ class Simulation:
 
     def blocks(self) -> Iterator[FrameBlock]:
         """Yield all blocks in order."""
-        for first in range(0, self.scene.frames, BLOCK_FRAMES):
+        for first in range(0, self.scene.frames, self._block_frames):
             yield self.block(first)
 
 
 def simulate(
     scenario: Scenario, *, model: Model | str | Path | None = None, savings: bool = True
 ) -> Iterator[FrameBlock]:
-    """Yield a scenario's frames in blocks of `BLOCK_FRAMES`, the last one shorter.
+    """Yield a scenario's frames in blocks of `block_frames`, the last one shorter.
 
     Args:
         scenario: what `replay.load` returned.
