@@ -42,6 +42,36 @@ def test_what_several_rooms_need_is_taken_from_its_one_place(name, home):
     assert [path for path, tree in TREES.items() if name in names_in(tree) and path != home] == []
 
 
+INSIDE = {
+    "numba": ["numerics/jit/compiler.py", "numerics/jit/linking.py"],
+    "rerun": ["recording/rerun_inside.py"],
+}
+"""Where names of a library that are not public may stand; the text of the first says what to do about a release."""
+
+PRIVATE = {
+    "numba": {"_nrt", "_config_fname", "_library_class", "_cache", "_linking_libraries"},
+    "rerun": {"rerun_bindings", "ChunkInternal", "_log_to_stream", "_internal"},
+}
+"""Names that are not public, besides those that are imported; numba documents one module of its core."""
+
+
+def private_names(tree, library):
+    """Return the names of a library that are not public and that a module uses."""
+    imports = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
+    modules = {f"{node.module}.{alias.name}" for node in imports for alias in node.names}
+    inner = {name for name in modules if name.startswith((f"{library}.core.", f"{library}._"))} - {"numba.core.event"}
+    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return inner | ((names_in(tree) | texts) & PRIVATE[library])
+
+
+@pytest.mark.parametrize("library", INSIDE)
+def test_what_is_not_public_of_a_library_stands_in_one_place(library):
+    found = {path: private_names(tree, library) for path, tree in TREES.items()}
+    outside = {path: names for path, names in found.items() if names and path not in INSIDE[library]}
+    assert outside == {}, f"move it to {INSIDE[library][0]}, with a public way that does the same"
+    assert all(found[path] for path in INSIDE[library])
+
+
 @pytest.mark.parametrize("name", ["PairRules", "CollisionEntries", "contacts"])
 def test_sparse_results_stay_inside_collision_and_bench(name):
     """Pairs by rule and contacts alone are for benchmarks: no scenario makes them, and none is advised to."""

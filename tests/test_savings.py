@@ -64,6 +64,7 @@ def compare(columns, others, rtol=0.0):
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.compiled
 def test_shipped_scenarios_read_the_same(path):
     for scenario in load_cases(path):
         frames = 37  # 6 Hz, with what stands still for longer than that

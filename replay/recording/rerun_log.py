@@ -18,7 +18,7 @@ from replay.collision.passages import passages
 from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats
 from replay.recording import blueprint
-from replay.recording.blueprint_parts import RecordingBlueprint
+from replay.recording.blueprint_parts import recording_blueprint
 from replay.recording.events import EventFinder
 from replay.recording.rerun_columns import Chunks, Column, Index, column, entity, index_of, packed
 from replay.recording.rerun_file import RerunFile
@@ -96,7 +96,7 @@ class RerunWriter:
     def finish(self) -> None:
         """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
-            layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
+            layout = recording_blueprint({chart for chart, _ in self._named}, self._corners, self._end)
             self._file.arrange(layout)
             self._stream = None
             self._file.finish()

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from replay.batch.case import CaseOrder, CaseResult, Status, run_case
+from replay.batch.case import CaseOrder, CaseResult, CaseStatus, run_case
 from replay.recording.reader import read
 from replay.scenario.load import load_sources
 from tests.batch import scenes
@@ -22,12 +22,12 @@ def run(folder, *expectations):
 @pytest.mark.parametrize(
     ("expectations", "status"),
     [
-        ((), Status.PASSED),
-        ((HOLDS,), Status.PASSED),
-        ((HOLDS, HOLDS), Status.PASSED),
-        ((HOLDS, BREAKS), Status.BROKEN),
-        ((BREAKS, HOLDS), Status.BROKEN),
-        ((BREAKS, BREAKS), Status.BROKEN),
+        ((), CaseStatus.PASSED),
+        ((HOLDS,), CaseStatus.PASSED),
+        ((HOLDS, HOLDS), CaseStatus.PASSED),
+        ((HOLDS, BREAKS), CaseStatus.BROKEN),
+        ((BREAKS, HOLDS), CaseStatus.BROKEN),
+        ((BREAKS, BREAKS), CaseStatus.BROKEN),
     ],
 )
 def test_a_scenario_passes_when_all_that_is_expected_holds(tmp_path, expectations, status):

@@ -53,6 +53,7 @@ def crowd(rng, *, trees, frames, away=0.0):
 @pytest.mark.parametrize("bounds", BOUNDS)
 @pytest.mark.parametrize("clearance", ["never", "near"])
 @pytest.mark.parametrize("away", [0.0, 1e6])
+@pytest.mark.compiled
 def test_a_tree_over_all_bodies_does_not_show(monkeypatch, bounds, clearance, away):
     rng = np.random.default_rng(21)
     bodies, linkage, poses = crowd(rng, trees=14, frames=24, away=away)
@@ -108,6 +109,7 @@ def test_near_pairs_are_those_whose_swept_boxes_meet():
     assert len(found) == len(a) > 300
 
 
+@pytest.mark.compiled
 def test_candidates_grow_with_the_bodies_not_with_their_pairs():
     looked_at = []
     for count in (100, 800):

@@ -7,6 +7,7 @@ checkout is never touched.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import json
 import math
@@ -45,6 +46,7 @@ MOST_MEMORY = 3 << 30
 """Bytes of a trial and its children; beyond, it is ended."""
 _OPTIONS = ("-x", "-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
 _OPTIONS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is preloaded
+_PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _BY_FILE = "seconds.json"
 _NO_TEST = 5  # pytest's exit code
 _PAUSE = 0.05  # seconds between two looks
@@ -126,7 +128,10 @@ class Tree:
         if child == 0:
             resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(limit),) * 2)
             _be_pytest(self.root, tests, output, cache, self._temporary, compiled=compiled)
-        verdict, seconds = _watch(child, time.monotonic() + _CLOCK * limit)
+        try:
+            verdict, seconds = _watch(child, time.monotonic() + _CLOCK * limit)
+        finally:
+            _end_descendants()
         text = output.read_text(errors="replace")[-3000:] if output.exists() else ""
         file = self._temporary / _BY_FILE
         by_file = json.loads(file.read_text()) if verdict == "passed" and file.exists() else {}
@@ -134,7 +139,10 @@ class Tree:
 
 
 def preload() -> None:
-    """Import what all trials need."""
+    """Import what all trials need, and become the parent of what they leave behind, so that it can be ended."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # by way of what ends trials
     for name in PRELOADED:
         importlib.import_module(name)
 
@@ -144,6 +152,7 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
     code = 70
     try:
         os.setsid()
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         descriptor = os.open(output, os.O_WRONLY | os.O_CREAT)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(descriptor, 1)
@@ -185,7 +194,7 @@ class _Watch:
 
 
 def _watch(child: int, deadline: float) -> tuple[str, float]:
-    """Wait for a trial and return its verdict and processor time [s]; end what takes too much, with its session."""
+    """Wait for a trial and return its verdict and processor time [s]; end what takes too much."""
     verdict = ""
     looked = 0.0
     while True:
@@ -198,10 +207,9 @@ def _watch(child: int, deadline: float) -> tuple[str, float]:
             looked = time.monotonic()
             verdict = "too large" if _memory(child) > MOST_MEMORY else ""
         if verdict:
-            _end_session(child)
+            os.kill(child, signal.SIGKILL)
         else:
             time.sleep(_PAUSE)
-    _end_session(child)
     code = os.waitstatus_to_exitcode(status)
     if code == _NO_TEST:
         raise RuntimeError("no test was found")
@@ -210,9 +218,14 @@ def _watch(child: int, deadline: float) -> tuple[str, float]:
     return verdict or ("passed" if code == 0 else "failed"), used.ru_utime + used.ru_stime
 
 
-def _end_session(child: int) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
+def _end_descendants() -> None:
+    """End all that a trial has started, also what has a session of its own and was left behind (see `preload`)."""
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process.kill()
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
 
 
 def _memory(child: int) -> int:

@@ -30,6 +30,7 @@ class Package:
         numerics = Path(replay.__file__).parent / "numerics"
         shutil.copytree(numerics / "jit", self.root / "numerics" / "jit", ignore=shutil.ignore_patterns("__pycache__"))
         shutil.copy(numerics / "compiling.py", self.root / "numerics")
+        shutil.copy(numerics / "remarks.py", self.root / "numerics")
         self.write("geometry/callee.py", CALLEE.format("1.0"))
         self.write("collision/caller.py", CALLER)
 

@@ -9,7 +9,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from replay.numerics import jit
-from replay.numerics.jit import policy
+from replay.numerics.jit import compiler
 
 KERNEL_ROOMS = ("numerics", "geometry", "kinematics", "collision", "sensing")
 
@@ -28,7 +28,7 @@ def test_leaf_kernels_compute_what_kernels_do_with_or_without_the_option(monkeyp
     leaf = jit.leaf_kernel(total)
     assert leaf.targetoptions["_nrt"] is False
     assert leaf(rows) == expected
-    monkeypatch.setattr(policy, "_counting_is_optional", lambda: False)
+    monkeypatch.setattr(compiler, "UNCOUNTED", {})
     usual = jit.leaf_kernel(total)
     assert "_nrt" not in usual.targetoptions
     assert usual(rows) == expected

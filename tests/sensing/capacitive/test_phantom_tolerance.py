@@ -12,6 +12,8 @@ from replay.sensing.capacitive.tree.clusters import make_clusters
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
+pytestmark = pytest.mark.compiled  # a phantom of 26 756 triangles
+
 _PLATE = np.array([[0.025, 0.1]])
 _REGIMES = {
     "touching": (1e-9, 0.01, 30.0),
