@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
-from replay.numerics.arrays import Floats, Integers
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.scenario.layout import Layout
 from replay.sensing.kinds import KINDS, of_kind
 
@@ -146,6 +146,32 @@ def simulate(
     from replay.scenario.scene import build
 
     yield from Simulation(build(scenario, model=model, savings=savings)).blocks()
+
+
+def touching(scene: Scene, positions: Floats, free_poses: Floats) -> Iterator[Flags]:
+    """Yield which pairs are in contact in any states of the joints, in blocks (k, P).
+
+    Args:
+        scene: whose pairs they are, in the order of its layout.
+        positions: (n, J) [rad or m], in the order of its linkage's joints.
+        free_poses: (n, K, 4, 4), of its free joints.
+    """
+    from replay.collision.columns import Level
+
+    collision = _collision(scene, None)
+    for first in range(0, len(positions) if collision else 0, BLOCK_FRAMES):
+        chosen = slice(first, first + BLOCK_FRAMES)
+        assert collision is not None
+        yield collision.run(scene.linkage.forward(positions[chosen], free_poses[chosen])).level == Level.CONTACT
+
+
+def touching_first(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the pairs that are in contact in the first frame."""
+    from replay.kinematics.motion import sample
+
+    states = sample(scene.linkage, scene.script, scene.seconds(0, 1))
+    found = touching(scene, states.positions, states.free_poses)
+    return tuple(name for flags in found for name, met in zip(scene.layout.pairs, flags[0], strict=True) if met)
 
 
 def _collision(scene: Scene, motion: Motion | None) -> CollisionPipeline | None:
