@@ -222,15 +222,23 @@ class McapLog:
 
     def _define_from_chunks(self) -> None:
         """Unpack the chunks that may hold the schemas and channels which the rest of the file does not have."""
+        passed = []
         for chunk in self.chunks:
             found = [self.channels.get(number) for number in chunk.channels]
-            if not chunk.loose and not (
-                found and all(c and (c.schema_id == 0 or c.schema_id in self.schemas) for c in found)
-            ):
+            if found and all(c and self._has_schema(c) for c in found):
+                passed.append(chunk)
+            elif not chunk.loose:
                 deque(self.runs(chunk), maxlen=0)
+        for chunk in passed:  # the last record of one may be a schema of which the next one makes use
+            if all(map(self._has_schema, self.channels.values())):
+                return
+            deque(self.runs(chunk), maxlen=0)
         for channel in self.channels.values():
-            if channel.schema_id and channel.schema_id not in self.schemas:
+            if not self._has_schema(channel):
                 raise self._damage(f"channel {channel.topic!r} refers to a schema that is not there")
+
+    def _has_schema(self, channel: Channel) -> bool:
+        return channel.schema_id == 0 or channel.schema_id in self.schemas
 
     def _next_record(self, at: int) -> tuple[int, bytes, int]:
         head = self._bytes_at(at, RECORD_HEAD) if at + RECORD_HEAD <= self._size else b""
