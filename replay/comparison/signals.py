@@ -101,7 +101,7 @@ def _all_groups(recording: Recording) -> Iterator[Group]:
             yield Group(field_, signals, getattr(recording.collision, field_.name))
     for kind, columns in recording.readings.items():
         topics = [KINDS[kind].topic(sensor) for sensor in layout.sensors[kind]]
-        for field_ in _gates_first(columns.fields()):
+        for field_ in _gates_first(columns.present()):
             yield from _of_sensors(topics, field_, getattr(columns, field_.name), layout)
 
 
@@ -131,7 +131,7 @@ def places(layout: Layout, topic: str) -> tuple[object, int]:
             return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
         case "collision":
             return layout.pairs, len(CollisionColumns.fields()) * len(layout.pairs)
-    fields = KINDS[group].columns.fields() if group in KINDS else ()
+    fields = [field_ for field_ in KINDS[group].columns.fields() if not field_.optional] if group in KINDS else []
     meant = {names: getattr(layout, names) for field_ in fields for names in (field_.each, field_.names) if names}
     counts = (len(meant[field_.each]) if field_.each else len(field_.letters) or 1 for field_ in fields)
     return meant, sum(counts)

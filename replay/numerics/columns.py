@@ -11,7 +11,7 @@ import enum
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self, get_args, get_type_hints
+from typing import Any, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ class Field:
         type: of the values.
         most: largest value of one that counts or is a state; what its type or `states` allow when left out.
         nothing: the value when there is nothing to tell.
+        optional: whether the column may be None, and is not recorded then; it follows from its type.
     """
 
     name: str = ""
@@ -76,6 +77,7 @@ class Field:
     type: np.dtype[Any] = dataclasses.field(default_factory=lambda: np.dtype(np.float64))
     most: int = 0
     nothing: float = np.nan
+    optional: bool = False
 
 
 class Columns:
@@ -88,11 +90,17 @@ class Columns:
         hints = get_type_hints(cls, include_extras=True)
         return tuple(_described(field.name, *get_args(hints[field.name])) for field in dataclasses.fields(cls))  # type: ignore[arg-type]
 
+    def present(self) -> tuple[Field, ...]:
+        """Return the description of each column that there is, in order."""
+        return tuple(field for field in self.fields() if getattr(self, field.name) is not None)
+
     @classmethod
     def nothing(cls, frames: int, sensors: int, **counts: int) -> Self:
         """Return columns that tell nothing; `counts` says how many names there are of what a field has `each` of."""
         values = {}
         for field in cls.fields():
+            if field.optional:
+                continue
             rest = (counts[field.each],) if field.each else (len(field.letters),) if field.letters else ()
             values[field.name] = np.full((frames, sensors, *rest), field.nothing, dtype=field.type)
         return cls(**values)
@@ -100,6 +108,8 @@ class Columns:
 
 def _described(name: str, array: Any, field: Field) -> Field:
     """Return the description of a column, with what follows from its name and type."""
+    optional = type(None) in get_args(array)
+    array = next(part for part in (*get_args(array), array) if get_origin(part) is np.ndarray)  # X of "X | None"
     dtype = np.dtype(get_args(get_args(array)[1])[0])
     kinds = {"f": Kind.NUMBER, "b": Kind.FLAG}
     most = max(field.states) if field.states else field.most
@@ -115,6 +125,7 @@ def _described(name: str, array: Any, field: Field) -> Field:
         most=most,
         type=dtype,
         nothing=nothing.get(dtype.kind, 0),
+        optional=optional,
     )
 
 

@@ -57,7 +57,7 @@ def tables(recording: Recording) -> dict[str, Table]:
     for kind, columns in recording.readings.items():
         for sensor, name in enumerate(layout.sensors[kind]):
             table = result[KINDS[kind].topic(name)] = dict(time)
-            for field in columns.fields():
+            for field in columns.present():
                 values = getattr(columns, field.name)[:, sensor]
                 for k, each in enumerate(getattr(layout, field.each) if field.each else ()):
                     _add(table, f"{each} {field.label}", field, values[:, k], layout)

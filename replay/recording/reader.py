@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -283,7 +283,11 @@ class _Assembly:
             columns = KINDS[kind].columns
             if topics:
                 found[kind] = columns(
-                    **{f.name: np.stack([self._field(t, f) for t in topics], axis=1) for f in columns.fields()}
+                    **{
+                        f.name: np.stack([self._field(t, f) for t in topics], axis=1)
+                        for f in columns.fields()
+                        if not (f.optional and _lack(topics, f))
+                    }
                 )
         return found
 
@@ -309,6 +313,11 @@ def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
             for kind, names in layout.sensors.items()
         },
     )
+
+
+def _lack(topics: Sequence[Topic], field: Field) -> bool:
+    """Return whether no topic has a field, which then was not recorded."""
+    return not any(field.name in topic.columns for topic in topics)
 
 
 def _stack(columns: list[Any], frames: int, *rest: int) -> Any:

@@ -12,6 +12,7 @@ from replay.language.units import (
     ANGLE,
     LENGTH,
     Angle,
+    Earth,
     Length,
     MaxAcceleration,
     MaxAngularAcceleration,
@@ -127,3 +128,6 @@ class Link(Part):
     """How the link moves in the joint's frame."""
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""
+    earth: Earth = math.inf
+    """How the link is connected to earth, for the capacitive methods bem and field: grounded, floating, or through a
+    capacitance [F] of what is not modelled (shoes, a mattress)."""

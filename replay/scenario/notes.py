@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
 from replay.scenario.expectations import Between, PairExpectation
+from replay.scenario.names import matches
+from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.collision.pairs import CollisionBody
+    from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
 
 
-def notes(scenario: Scenario) -> list[Problem]:
-    """Return the notes on a scenario, each with its place."""
+def notes(scenario: Scenario, model: Model | None = None) -> list[Problem]:
+    """Return the notes on a scenario, each with its place; a model replaces the scenario's own."""
     end = float(scenario.duration)
     after = f"after the scenario's end at {end:.6g} s"
     problem = scenario.provenance.problem
@@ -36,7 +39,25 @@ def notes(scenario: Scenario) -> list[Problem]:
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, Between) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    found.extend(_sensor_notes(scenario, model or scenario.model))
     return found
+
+
+def _sensor_notes(scenario: Scenario, model: Model) -> Iterator[Problem]:
+    earth = {name: link.earth for name, link in scenario.links.items()}
+    sensed = [name for name, link in scenario.links.items() if any(shape.sense for shape in link.shapes.values())]
+    for kind in KINDS.values():
+        written = scenario.sensors.of(kind.name)
+        felt = {
+            name: [
+                link
+                for link in sensed
+                if link != sensor.link and not any(matches(pattern, link) for pattern in sensor.ignore)
+            ]
+            for name, sensor in written.items()
+        }
+        for path, rule in kind.notes(written, felt, earth, getattr(model, kind.name)):
+            yield scenario.provenance.problem(("sensors", kind.name, *path), rule)
 
 
 def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:

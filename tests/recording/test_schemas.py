@@ -55,5 +55,8 @@ def test_field_numbers_stay_what_they_were_in_format_1() -> None:
             "saturated": 4,
             "touching": 5,
             "per_object": 6,
+            "increase": 7,
+            "error": 8,
+            "unresolved": 9,
         },
     }
