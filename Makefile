@@ -5,8 +5,10 @@ BIN := $(VENV)/bin
 RECORDINGS := recordings
 BASELINES := tests/baselines
 NIGHT := regress
+# uv needs 4 s for what takes pip half a minute; pip takes over, and uv has said why, where only pip knows the way to an index.
 # Python compiles the modules that are imported, when they are: of thousands in a fresh environment few ever are
-INSTALL := -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1) || $(call pip,$(1))
+pip = $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt $(1)
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
@@ -17,12 +19,13 @@ help:  ## list the targets
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python $(INSTALL) -e .
-	$(BIN)/python $(INSTALL) --no-deps $(PHANTOMS)
+	$(call pip,uv)
+	$(call install,-e .)
+	$(call install,--no-deps $(PHANTOMS))
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
-	$(BIN)/python $(INSTALL) -e '.[test]'
+	$(call install,-e '.[test]')
 	@touch $@
 
 setup: $(VENV)/.run  ## create .venv and install the package and the phantoms
@@ -60,7 +63,7 @@ schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.comparison.rules_file
 
 bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
-	$(BIN)/python $(INSTALL) -e '.[bench]'
+	$(call install,-e '.[bench]')
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 

@@ -8,11 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats, Integers
 from replay.scenario.layout import Layout
 from replay.sensing.kinds import KINDS, of_kind
 
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "simulate"]
 
-Floats = NDArray[np.float64]
 
 BLOCK_FRAMES = 256
 """Frames per block; recorded, because warm-start state resets at block starts."""
@@ -48,7 +45,7 @@ class FrameBlock:
 
     layout: Layout
     first: int
-    time: NDArray[np.int64]
+    time: Integers
     joint_positions: Floats
     joint_velocities: Floats
     link_poses: Floats

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.batch.baseline import Baseline, Entry, check_name, check_scenario
-from replay.batch.case import Status
+from replay.batch.case import CaseStatus
 from replay.comparison import wording
-from replay.comparison.difference import Difference, Verdict
+from replay.comparison.difference import Difference, DiffVerdict
 from replay.comparison.provenance import FILES
 from replay.comparison.run_folder import read_run
 from replay.comparison.runs import diff
@@ -52,13 +52,13 @@ def plan_acceptance(directory: Path, baseline: Path) -> Acceptance:
     """
     try:
         run = read_run(directory)
-        statuses = {name: Status(entry["status"]) for name, entry in run["scenarios"].items()}
+        statuses = {name: CaseStatus(entry["status"]) for name, entry in run["scenarios"].items()}
     except (OSError, ValueError):
         raise InvalidValue("RUNDIR", directory, "is no run folder: it has no run.json of replay") from None
     if run["interrupted"]:
         rule = "holds a run that was interrupted; run it again (`replay run --resume` keeps what is done)"
         raise InvalidValue("RUNDIR", directory, rule)
-    failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not Status.PASSED]
+    failed = [f"{name} ({status.value})" for name, status in statuses.items() if status is not CaseStatus.PASSED]
     if failed:
         rule = (
             f"holds scenarios that did not pass: {', '.join(failed)}; run without them (--select) to accept the others"
@@ -94,4 +94,4 @@ def _news(before: Path | None, recording: Path) -> str:
 def _same(found: Difference) -> bool:
     """Return whether nothing but versions differs: not the results, nor the texts and the model that they are of."""
     inputs = (FILES, "model", "root")
-    return found.verdict is Verdict.SAME and not any(change.name.startswith(inputs) for change in found.provenance)
+    return found.verdict is DiffVerdict.SAME and not any(change.name.startswith(inputs) for change in found.provenance)

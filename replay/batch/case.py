@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
-from replay.scenario.verdict import ExpectationCheck, Outcome
+from replay.scenario.expectation_check import ExpectationCheck, Outcome
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenResult
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from replay.simulation import FrameBlock
 
 
-class Status(enum.Enum):
+class CaseStatus(enum.Enum):
     """What became of a scenario."""
 
     PASSED = "passed"
@@ -35,7 +35,7 @@ class Status(enum.Enum):
     @property
     def recorded(self) -> bool:
         """Whether there is a whole recording."""
-        return self in (Status.PASSED, Status.BROKEN)
+        return self in (CaseStatus.PASSED, CaseStatus.BROKEN)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class CaseResult:
     """
 
     name: str
-    status: Status = Status.PASSED
+    status: CaseStatus = CaseStatus.PASSED
     frames: int = 0
     outcomes: tuple[Outcome, ...] = ()
     recordings: RecordedPaths | None = None
@@ -111,7 +111,7 @@ class CaseResult:
         """Return the result that `as_json` wrote, as one that is reused; ValueError if its status is none."""
         return CaseResult(
             name=values["scenario"],
-            status=Status(values["status"]),
+            status=CaseStatus(values["status"]),
             frames=values["frames"],
             outcomes=tuple(Outcome(place=None, **outcome) for outcome in values["expectations"]),
             recordings=recordings,
@@ -140,7 +140,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         seconds = time.perf_counter() - begin
         return CaseResult(
             scenario.name,
-            Status.FAILED,
+            CaseStatus.FAILED,
             error=str(error),
             invalid=isinstance(error, ScenarioError),
             seconds=seconds,
@@ -149,7 +149,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     outcomes = tuple(check.finish())
     return CaseResult(
         scenario.name,
-        Status.PASSED if all(outcome.passed for outcome in outcomes) else Status.BROKEN,
+        CaseStatus.PASSED if all(outcome.passed for outcome in outcomes) else CaseStatus.BROKEN,
         frames=scene.frames,
         outcomes=outcomes,
         recordings=recordings,

@@ -7,7 +7,7 @@ import dataclasses
 import json
 from pathlib import Path
 
-from replay.batch.case import CaseResult, Status, describe
+from replay.batch.case import CaseResult, CaseStatus, describe
 from replay.batch.written import RESULT
 from replay.errors import NoSpaceError, WriteError, printable
 from replay.logs.part_file import UNFINISHED, append_lines, refuse_link, write_file
@@ -50,7 +50,7 @@ def finish(result: CaseResult, folder: Path) -> CaseResult:
 
 def unwritable(result: CaseResult, error: WriteError) -> CaseResult:
     """Return the result of a scenario whose folder cannot be written."""
-    failed = CaseResult(result.name, Status.FAILED, error=result.error or str(error), invalid=result.invalid)
+    failed = CaseResult(result.name, CaseStatus.FAILED, error=result.error or str(error), invalid=result.invalid)
     full = result.no_space or isinstance(error, NoSpaceError)
     return dataclasses.replace(failed, seconds=result.seconds, memory=result.memory, no_space=full)
 

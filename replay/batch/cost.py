@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from replay.scenario.model import Scenario
-from replay.scenario.shapes import Mesh
+from replay.scenario.shapes import MeshPart
 from replay.sensing.kinds import KINDS
 
 _BYTES_PER_TRIANGLE = 50  # of a binary STL file
@@ -18,7 +18,7 @@ def expected_cost(scenario: Scenario) -> float:
     shapes = [(link, name, shape) for link, entry in scenario.links.items() for name, shape in entry.shapes.items()]
     colliding = sum(shape.collide for *_, shape in shapes) if scenario.collision.pairs == "all" else 0
     meshes = {
-        scenario.provenance.meshes.get((link, name), "") for link, name, shape in shapes if isinstance(shape, Mesh)
+        scenario.provenance.meshes.get((link, name), "") for link, name, shape in shapes if isinstance(shape, MeshPart)
     }
     triangles = len(shapes) * _TRIANGLES_OF_A_PRIMITIVE
     triangles += sum(len(scenario.sources.get(mesh, b"")) for mesh in meshes) // _BYTES_PER_TRIANGLE

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from replay.batch.baseline import Baseline, Entry
-from replay.batch.judged import Judged, Verdict
+from replay.batch.judged import Judged, RegressVerdict
 from replay.errors import NoSpaceError, ReplayError
 
 
@@ -17,7 +17,7 @@ def create_baselines(judged: Mapping[str, Judged], accepted: Baseline) -> dict[s
 
     One that cannot be stored keeps none of the others from it.
     """
-    left = {name: item for name, item in judged.items() if item.verdict is Verdict.CREATED}
+    left = {name: item for name, item in judged.items() if item.verdict is RegressVerdict.CREATED}
     done: dict[str, Judged] = {}
     while left:
         try:
@@ -33,7 +33,7 @@ def create_baselines(judged: Mapping[str, Judged], accepted: Baseline) -> dict[s
             file = getattr(error, "file", None)
             odd = [name for name, item in left.items() if file == str(recording_of(item))] or list(left)
             for name in odd:
-                done[name] = dataclasses.replace(left.pop(name), verdict=Verdict.MISSING, message=str(error))
+                done[name] = dataclasses.replace(left.pop(name), verdict=RegressVerdict.MISSING, message=str(error))
     return done
 
 

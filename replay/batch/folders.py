@@ -10,14 +10,14 @@ SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
-class Found:
+class FolderFiles:
     """What a folder holds: YAML files, sorted by path, and a line for each place that cannot be looked at."""
 
     files: list[Path]
     left_out: list[str]
 
 
-def look_through(folder: Path) -> Found:
+def look_through(folder: Path) -> FolderFiles:
     """Return the YAML files of a folder and of all below, links to files and folders included, each folder once.
 
     Hidden files and folders are passed over. A link to no file that is named as one is among the files, so that reading
@@ -29,7 +29,7 @@ def look_through(folder: Path) -> Found:
         for start in pending:
             search.below(start)
         pending, search.links = sorted(search.links), []
-    return Found(sorted(search.files), search.left_out)
+    return FolderFiles(sorted(search.files), search.left_out)
 
 
 class _Search:

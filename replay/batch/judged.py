@@ -18,7 +18,7 @@ OVERLAY = "{name}.difference.rrd"
 """Name of the recording that shows both runs of a scenario."""
 
 
-class Verdict(enum.Enum):
+class RegressVerdict(enum.Enum):
     """What the regression says of a scenario."""
 
     SAME = "same"
@@ -38,12 +38,12 @@ class Verdict(enum.Enum):
     @property
     def fine(self) -> bool:
         """Whether there is nothing to be done about it."""
-        return self in (Verdict.SAME, Verdict.CREATED, Verdict.UNCOMPARED, Verdict.SKIPPED)
+        return self in (RegressVerdict.SAME, RegressVerdict.CREATED, RegressVerdict.UNCOMPARED, RegressVerdict.SKIPPED)
 
     @property
     def left_out(self) -> bool:
         """Whether it says nothing about the scenario's results."""
-        return self in (Verdict.UNCOMPARED, Verdict.SKIPPED)
+        return self in (RegressVerdict.UNCOMPARED, RegressVerdict.SKIPPED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Judged:
     """
 
     name: str
-    verdict: Verdict
+    verdict: RegressVerdict
     message: str = ""
     result: CaseResult | None = None
     comparison: Case | None = None
@@ -91,7 +91,7 @@ class Regression:
     judged: tuple[Judged, ...]
     unused: tuple[str, ...]
 
-    def count(self, *verdicts: Verdict) -> int:
+    def count(self, *verdicts: RegressVerdict) -> int:
         """Return how many scenarios have one of some verdicts."""
         return sum(item.verdict in verdicts for item in self.judged)
 

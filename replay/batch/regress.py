@@ -11,24 +11,24 @@ from pathlib import Path
 from typing import Literal
 
 from replay.batch.baseline import Baseline
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.case_folder import LOG
 from replay.batch.claim import claim
 from replay.batch.create import create_baselines, recording_of
 from replay.batch.drawings import Album
 from replay.batch.history import check_history
-from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, Verdict
+from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, RegressVerdict
 from replay.batch.run import Execution, run_all
 from replay.batch.run_file import Run
 from replay.batch.select import Selection
 from replay.batch.watch import Unwatched, Watch
 from replay.comparison import wording
-from replay.comparison.difference import Verdict as DiffVerdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.log_changes import same_messages
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import plots
 from replay.comparison.rules import Rules
-from replay.comparison.runs import Case, Pair, diff_pair, read_pair
+from replay.comparison.runs import Case, RecordingPair, diff_pair, read_pair
 from replay.errors import InvalidValue, NoSpaceError, RecordingError, ReplayError, count, printable
 from replay.logs.part_file import append_lines
 from replay.scenario.methods import Model
@@ -38,7 +38,13 @@ MissingBaseline = Literal["fail", "create", "skip"]
 Rrd = Literal["failing", "all", "none"]
 _AGAIN = ".rrd"
 """Folder in which failing scenarios are recorded for eyes."""
-_KNOWN = (Verdict.SAME, Verdict.DIFFERENT, Verdict.CREATED, Verdict.MISSING, Verdict.UNCOMPARED)
+_KNOWN = (
+    RegressVerdict.SAME,
+    RegressVerdict.DIFFERENT,
+    RegressVerdict.CREATED,
+    RegressVerdict.MISSING,
+    RegressVerdict.UNCOMPARED,
+)
 """Verdicts beside which a broken expectation is what matters."""
 
 
@@ -119,11 +125,13 @@ def regress(
                 _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
         except KeyboardInterrupt:
             run = dataclasses.replace(run, interrupted=True)
-            unstored = [name for name, item in judged.items() if item.verdict is Verdict.CREATED and not item.message]
+            unstored = [
+                name for name, item in judged.items() if item.verdict is RegressVerdict.CREATED and not item.message
+            ]
             judged = {name: item for name, item in judged.items() if name not in unstored}
     ended = [judged.get(scenario.name) or _unjudged(scenario.name, result) for scenario, result in ran]
     ended += [_unjudged(result.name, result) for result in selection.failed]
-    ended += [Judged(name, Verdict.SKIPPED, why) for name, why in selection.skipped.items()]
+    ended += [Judged(name, RegressVerdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
     unused = _unused(selection, accepted, {item.name for item in ended})
     ended = [_renamed(item, accepted, unused) for item in ended]
@@ -132,7 +140,7 @@ def regress(
 
 def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
     """Say of a scenario without a baseline which unused one is byte by byte the same: it may have been renamed."""
-    if item.verdict is not Verdict.MISSING:
+    if item.verdict is not RegressVerdict.MISSING:
         return item
     for name in unused:
         with contextlib.suppress(Exception):  # whatever is odd about that one
@@ -179,10 +187,10 @@ def _judge(
     if not result.status.recorded or result.recordings is None:
         return _unjudged(name, result)
     found = _compared(name, result, baseline, rules, missing, overlay=overlay)
-    if result.status is Status.BROKEN and found.verdict in _KNOWN:
+    if result.status is CaseStatus.BROKEN and found.verdict in _KNOWN:
         broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
         message = "; ".join([*broken, *([found.message] if found.message else [])])
-        return dataclasses.replace(found, verdict=Verdict.BROKEN, message=message)
+        return dataclasses.replace(found, verdict=RegressVerdict.BROKEN, message=message)
     return found
 
 
@@ -190,8 +198,8 @@ def _unjudged(name: str, result: CaseResult) -> Judged:
     """Return the verdict of a scenario that has not been compared, because it failed or the run was ended."""
     if result.status.recorded:
         message = "the run was ended before it was compared"
-        return Judged(name, Verdict.INTERRUPTED, message, result)
-    return Judged(name, Verdict(result.status.value), result.error, result)
+        return Judged(name, RegressVerdict.INTERRUPTED, message, result)
+    return Judged(name, RegressVerdict(result.status.value), result.error, result)
 
 
 def _compared(
@@ -200,7 +208,7 @@ def _compared(
     assert result.recordings is not None
     accepted, candidate = baseline.recording(name), result.recordings.mcap
     if accepted is None:
-        verdicts = {"fail": Verdict.MISSING, "create": Verdict.CREATED, "skip": Verdict.UNCOMPARED}
+        verdicts = {"fail": RegressVerdict.MISSING, "create": RegressVerdict.CREATED, "skip": RegressVerdict.UNCOMPARED}
         message = "" if missing == "create" else f"{baseline.directory} holds no baseline of it"
         return Judged(name, verdicts[missing], message, result)
     try:
@@ -208,15 +216,17 @@ def _compared(
         found = diff_pair(pair, rules=rules)
     except RecordingError as error:
         ours = error.file == str(candidate)
-        verdict = Verdict.FAILED if ours else Verdict.UNREADABLE
+        verdict = RegressVerdict.FAILED if ours else RegressVerdict.UNREADABLE
         return Judged(name, verdict, f"its own recording: {error}" if ours else str(error), result)
     except Exception as error:
-        return Judged(name, Verdict.FAILED, _odd("it cannot be compared with its baseline", error, candidate), result)
+        return Judged(
+            name, RegressVerdict.FAILED, _odd("it cannot be compared with its baseline", error, candidate), result
+        )
     comparison = Case(name, accepted, candidate, found)
     if found.verdict is not DiffVerdict.DIFFERENT:
-        return Judged(name, Verdict.SAME, "", result, comparison)
+        return Judged(name, RegressVerdict.SAME, "", result, comparison)
     message = wording.summary(found)
-    item = Judged(name, Verdict.DIFFERENT, message, result, comparison)
+    item = Judged(name, RegressVerdict.DIFFERENT, message, result, comparison)
     try:
         item = dataclasses.replace(item, drawings=plots(found, pair))
     except Exception as error:
@@ -224,7 +234,7 @@ def _compared(
     return dataclasses.replace(item, message=item.message + _overlay(comparison, pair)) if overlay else item
 
 
-def _overlay(comparison: Case, pair: Pair) -> str:
+def _overlay(comparison: Case, pair: RecordingPair) -> str:
     """Write the recording that shows both runs; return what to add to the message when that is not possible."""
     try:
         write_overlay(comparison.candidate.with_name(OVERLAY.format(name=comparison.name)), comparison, pair)

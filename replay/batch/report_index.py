@@ -12,12 +12,12 @@ from urllib.parse import quote
 
 import replay
 from replay.batch.case_folder import LOG
-from replay.batch.judged import OVERLAY, Judged, Regression, Verdict
+from replay.batch.judged import OVERLAY, Judged, Regression, RegressVerdict
 from replay.comparison import report_html
 from replay.errors import count
 
 _FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, LOG, "result.json")
-_ORDER = [verdict for verdict in Verdict if not verdict.fine] + [verdict for verdict in Verdict if verdict.fine]
+_ORDER = sorted(RegressVerdict, key=lambda verdict: verdict.fine)
 _LINES = 30
 """Of a log that are shown on the page."""
 _OPEN = 3
@@ -25,7 +25,7 @@ _OPEN = 3
 
 
 @dataclass(frozen=True)
-class Row:
+class IndexRow:
     """One scenario on the page.
 
     Attributes:
@@ -52,7 +52,7 @@ def index(found: Regression, since: Mapping[str, str]) -> str:
     """
     ordered = sorted(found.judged, key=lambda item: (_ORDER.index(item.verdict), item.name))
     rows = [
-        Row(item, since.get(item.name, ""), _links(found, item), command(found, item), _log(found, item))
+        IndexRow(item, since.get(item.name, ""), _links(found, item), command(found, item), _log(found, item))
         for item in ordered
     ]
     failing = [row for row in rows if not row.item.verdict.fine]

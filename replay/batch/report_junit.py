@@ -7,14 +7,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import replay
-from replay.batch.judged import Judged, Regression, Verdict
+from replay.batch.judged import Judged, Regression, RegressVerdict
 from replay.comparison.report_junit import clean
 from replay.comparison.report_text import text
 from replay.comparison.runs import RunDifference
 from replay.errors import printable
 
 SUITE = "replay.regress"
-FAILURES = (Verdict.DIFFERENT, Verdict.BROKEN, Verdict.MISSING)
+FAILURES = (RegressVerdict.DIFFERENT, RegressVerdict.BROKEN, RegressVerdict.MISSING)
 
 
 def junit(found: Regression) -> bytes:
@@ -70,7 +70,7 @@ def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
 
 
 def _details(found: Regression, item: Judged) -> str:
-    if item.comparison is not None and item.verdict is Verdict.DIFFERENT:
+    if item.comparison is not None and item.verdict is RegressVerdict.DIFFERENT:
         return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
     log = Path(found.run.directory) / item.name / "log.txt"
     return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from replay.batch.case import CaseOrder, CaseResult, Status, run_case
+from replay.batch.case import CaseOrder, CaseResult, CaseStatus, run_case
 from replay.batch.case_folder import KINDS, LOG, begin, finish, remove_unfinished, unwritable
 from replay.batch.claim import Claim, claim
 from replay.batch.cost import expected_cost
@@ -30,7 +30,7 @@ from replay.logs.part_file import refuse_link, write_file
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
-_STATUS = {Ending.CRASHED: Status.CRASHED, Ending.TIMEOUT: Status.TIMEOUT, Ending.MEMORY: Status.MEMORY}
+_STATUS = {Ending.CRASHED: CaseStatus.CRASHED, Ending.TIMEOUT: CaseStatus.TIMEOUT, Ending.MEMORY: CaseStatus.MEMORY}
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 import psutil
 
 import replay
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.comparison.run_folder import RUN
 from replay.errors import NoSpaceError
 from replay.logs.part_file import write_file
@@ -49,7 +49,7 @@ class Run:
     @property
     def passed(self) -> bool:
         """Whether every scenario was recorded and kept its expectations."""
-        return all(result.status is Status.PASSED for result in self.results)
+        return all(result.status is CaseStatus.PASSED for result in self.results)
 
 
 class RunFile:
@@ -105,7 +105,7 @@ class RunFile:
         return run
 
     def _now(self, missing: str) -> Run:
-        lost = (CaseResult(name, Status.INTERRUPTED, error=missing) for name in self._names)
+        lost = (CaseResult(name, CaseStatus.INTERRUPTED, error=missing) for name in self._names)
         results = tuple(self._results.get(result.name, result) for result in lost)
         seconds = (datetime.datetime.now(datetime.UTC) - self._started).total_seconds()
         return Run(self._directory, results, True, self._started, seconds, self._workers)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import itertools
 import re
 import unicodedata
@@ -10,10 +9,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.folders import look_through
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
+from replay.language.globs import fits
 from replay.lfs_pointer import is_lfs_pointer
 from replay.scenario.load import load_cases, load_sources
 from replay.scenario.model import Scenario
@@ -161,7 +161,7 @@ class Selection:
     @property
     def failed(self) -> list[CaseResult]:
         """The results of the files that are not valid, which cannot be run."""
-        return [CaseResult(n, Status.FAILED, error=str(error), invalid=True) for n, error in self.invalid.items()]
+        return [CaseResult(n, CaseStatus.FAILED, error=str(error), invalid=True) for n, error in self.invalid.items()]
 
     @staticmethod
     def of(paths: Sequence[str | Path], patterns: Sequence[str], shard: Shard | None) -> Selection:
@@ -209,13 +209,13 @@ def _any_matches(name: str, patterns: Sequence[str]) -> bool:
 def _matches(scenario: Scenario, pattern: str) -> bool:
     """Return whether a pattern selects a scenario."""
     if pattern.startswith("tag:") and scenario.name != pattern:
-        return any(fnmatch.fnmatchcase(tag, pattern.removeprefix("tag:")) for tag in scenario.tags)
+        return any(fits(tag, pattern.removeprefix("tag:")) for tag in scenario.tags)
     return _name_matches(scenario.name, pattern)
 
 
 def _name_matches(name: str, pattern: str) -> bool:
     """Return whether a pattern stands for a name; a name itself does even when it holds brackets."""
-    return name == pattern or fnmatch.fnmatchcase(name, pattern)
+    return name == pattern or fits(name, pattern)
 
 
 def _attached(path: Path) -> Scenario:

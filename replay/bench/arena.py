@@ -17,7 +17,7 @@ STARTING = 300.0
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Reply:
     """What became of a question: `answer` if any, and else "hang", "crash" or the error's text."""
 
     answer: list[float] | None
@@ -26,7 +26,7 @@ class Outcome:
 
 def ask(
     answer: Answer, questions: Sequence[dict[str, Any]], *, patience: float = 5.0, starting: float = STARTING
-) -> list[Outcome]:
+) -> list[Reply]:
     """Return the outcomes of a contestant's answers, in order.
 
     Args:
@@ -36,7 +36,7 @@ def ask(
         patience: after which an answer is a hang [s].
         starting: the same for a fresh process's first answer [s].
     """
-    outcomes: list[Outcome] = []
+    outcomes: list[Reply] = []
     spare = True  # whether a fresh process survives the question that is for nothing
     while len(outcomes) < len(questions):
         with _Contestant(answer) as other:
@@ -74,16 +74,16 @@ class _Contestant:
         self._process.join()
         self._here.close()
 
-    def ask(self, question: dict[str, Any], patience: float) -> Outcome:
+    def ask(self, question: dict[str, Any], patience: float) -> Reply:
         """Return what becomes of a question."""
         try:
             self._here.send(question)
             if not self._here.poll(patience):
-                return Outcome(None, "hang")
+                return Reply(None, "hang")
             answer, failure = self._here.recv()
         except (EOFError, ConnectionError):
-            return Outcome(None, "crash")
-        return Outcome(answer, failure)
+            return Reply(None, "crash")
+        return Reply(answer, failure)
 
 
 def _serve(answer: Answer, connection: Connection) -> None:

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench import carm
 from replay.bench.inputs import rotations
 from replay.bench.measure import Check, Contender, compete, exponent
-from replay.bench.report import Grid, Plot, Report
+from replay.bench.report import Grid, LogLogPlot, Report
 from replay.collision.bodies import Bounds, Volumes, collect, fit_volumes
 from replay.collision.broad import COUNTS, sieve
 from replay.collision.columns import Level
@@ -21,8 +20,7 @@ from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.primitives import cuboid
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Flags
 
 VOLUMES: tuple[Literal["obb", "obb_vertices", "aabb", "sphere"], ...] = get_args(Bounds)
 FRAMES = 64
@@ -44,7 +42,7 @@ def growth(report: Report, *, most: int, rounds: int) -> None:
         for name in ("replay, obb", "replay, sphere")
     }
     named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}
-    report.plots.append(Plot("a frame against its bodies", "bodies", "s per frame", named, joined=True))
+    report.plots.append(LogLogPlot("a frame against its bodies", "bodies", "s per frame", named, joined=True))
     half = min(len(sizes) // 2, len(sizes) - 2)
     for name, points in lines.items():
         report.notes.append(
@@ -62,7 +60,7 @@ def tightness(frames: int, rounds: int) -> Grid:
     turns = np.ascontiguousarray(np.moveaxis(poses.world[:, :, :3, :3], 1, 0))
     asked = unanswered(rows, relative, turns)
     contenders: list[Contender] = []
-    passed: dict[str, NDArray[np.bool_]] = {}
+    passed: dict[str, Flags] = {}
     for bounds in VOLUMES:
         volumes = fit_volumes(bodies, arrays, bounds=bounds, pieces="exact")
         run = _sieve(volumes, asked)

@@ -6,23 +6,22 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.goals import Goal, advantage
 from replay.bench.hard_sensing import hard_plates
 from replay.bench.inputs import around, box_surface, phantom, slivers
 from replay.bench.measure import Check, Contender, Row, absent, compete
-from replay.bench.report import Plot, Report, pareto_plot
+from replay.bench.report import LogLogPlot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import plane
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.clusters import make_clusters
 from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
-Floats = NDArray[np.float64]
 Answer = Callable[[], Floats]
 
 PLATE = np.array([[0.025, 0.1]])
@@ -173,6 +172,6 @@ def judge(found: Floats, truth: Floats, tolerance: float) -> Check:
     return Check(float(error.max()), wrong, tolerance, float(error.mean()))
 
 
-def _plot(name: str, rows: Sequence[Row]) -> Plot:
+def _plot(name: str, rows: Sequence[Row]) -> LogLogPlot:
     groups = {row.method: row.method.split()[0] for row in rows}
     return pareto_plot(name, rows, "worst relative error", groups, headline=name == LARGE)

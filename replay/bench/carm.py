@@ -6,7 +6,6 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.engines import Body
 from replay.bench.inputs import box, ellipsoid
@@ -15,8 +14,6 @@ from replay.geometry.primitives import cuboid
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
 from replay.numerics import transforms
-
-Floats = NDArray[np.float64]
 
 FIXED, TURNS, SLIDES = JointType.FIXED, JointType.REVOLUTE, JointType.PRISMATIC
 

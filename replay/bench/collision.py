@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench import broad_phase, motion
 from replay.bench.engines import OURS, OURS_CHECKED, PEERS, Body, Engine
@@ -17,8 +16,7 @@ from replay.bench.measure import Check, Contender, Row, absent, compete
 from replay.bench.report import Report, pareto_plot
 from replay.bench.truth import proven_distance
 from replay.collision.gjk import distance
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 GROSS = 1e-3
 """A distance that is off by more than this part of the scene's size is wrong, not merely inexact."""

@@ -18,10 +18,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Wide = NDArray[np.longdouble]
+from replay.numerics.arrays import Flags, Floats, Wide
 
 THIN = 1e-6
 """Width over length below which a triangle is its edges."""
@@ -99,11 +97,11 @@ def _membership(x: Wide, v: Wide, h: np.longdouble) -> Wide:
     return result
 
 
-def _may_reach(corners: Wide, v: Wide, h: np.longdouble) -> NDArray[np.bool_]:
+def _may_reach(corners: Wide, v: Wide, h: np.longdouble) -> Flags:
     """Return which triangles' bounding balls are not clear of the cone."""
     centre = corners.mean(axis=1)
     radius = np.sqrt(np.sum((corners - centre[:, None]) ** 2, axis=2)).max(axis=1)
-    result: NDArray[np.bool_] = _membership(centre, v, h) >= -radius
+    result: Flags = _membership(centre, v, h) >= -radius
     return result
 
 
@@ -171,7 +169,7 @@ def _on_border(corners: Wide, v: Wide, h: np.longdouble) -> float:
     return float(delta / reached) if reached > 0 else math.inf
 
 
-def _ends(hit: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _ends(hit: Flags) -> list[tuple[int, int]]:
     """Return (sample, side) for every hit whose neighbour on that side is none."""
     return [(int(k), side) for side in (-1, 1) for k in np.flatnonzero(hit & ~np.roll(hit, -side))]
 

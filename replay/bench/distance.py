@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.cone_truth import nearest_in_cone
 from replay.bench.goals import Goal, advantage
 from replay.bench.inputs import around, box_surface, phantom, torus
 from replay.bench.measure import Check, Contender, Row, absent, compete
-from replay.bench.report import Plot, Report, pareto_plot
+from replay.bench.report import LogLogPlot, Report, pareto_plot
 from replay.errors import MissingPackageError
 from replay.geometry.primitives import sphere
 from replay.geometry.wide_tree import widen
+from replay.numerics.arrays import Floats
 from replay.sensing.distance.cone import half_angle
 from replay.sensing.distance.embree import EmbreeBundle
 from replay.sensing.distance.exact import sweep_exact
@@ -26,7 +26,6 @@ from replay.sensing.distance.readings import Nearest, nothing_yet
 from replay.sensing.distance.thesis import sweep_thesis
 from replay.sensing.target import Target, make_target
 
-Floats = NDArray[np.float64]
 Sweep = Callable[[Floats, Nearest], None]
 
 APERTURE = math.radians(30.0)
@@ -153,7 +152,7 @@ def judge(found: Floats, truth: Floats, *, exact: bool) -> Check:
     return Check(worst, int(wrong.sum()), TOO_FAR if exact else math.inf, mean, int(missed.sum()))
 
 
-def _plot(name: str, rows: Sequence[Row]) -> Plot:
+def _plot(name: str, rows: Sequence[Row]) -> LogLogPlot:
     groups = {row.method: row.method.split(",")[0] + " rays" for row in rows if row.method.endswith("rays")}
     return pareto_plot(name, rows, "worst relative error", groups, headline=name == LARGE)
 

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.gjk import Convex, Status, distance, distances, intersect, intersects
 from replay.geometry.hull import convex_hull
 from replay.numerics import transforms
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from replay.numerics.arrays import Flags, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +209,7 @@ def _mujoco(a: Body, b: Body, T_world_a: Floats, T_world_b: Floats) -> Queries:
     return Queries(lambda: ask(1e-6 * size) <= 0.0, distances)
 
 
-def _polytope(points: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _polytope(points: Floats) -> tuple[Floats, Integers]:
     """Return the hull's vertices and its triangles as indices into them; flat points as one fan."""
     hull = convex_hull(points)
     if hull is None:

@@ -11,19 +11,17 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.engines import Body, fcl_geometry
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Flags, Floats
 from replay.scenario.scene import Scene
 from replay.sensing.capacitive import CapacitiveSensor
 from replay.sensing.distance import DistanceSensor
 from replay.sensing.distance.rays import cap_directions
 from replay.sensing.target import Target
-
-Floats = NDArray[np.float64]
 
 RAYS = 1000
 SPLITS = 4
@@ -59,7 +57,7 @@ class Handwritten:
         felt = [any(sensor.senses(target.link) for sensor in scene.capacitive_sensors) for target in scene.targets]
         self._pieces = [_pieces(target) if needed else None for target, needed in zip(scene.targets, felt, strict=True)]
 
-    def run(self, poses: LinkPoses) -> tuple[NDArray[np.bool_], Floats, Floats]:
+    def run(self, poses: LinkPoses) -> tuple[Flags, Floats, Floats]:
         """Return contacts (n, P), distances (n, D) [m], NaN for nothing, and capacitances (n, C) [F]."""
         scene, count = self.scene, len(poses.world)
         contact = np.zeros((count, len(scene.pairs)), dtype=np.bool_)
@@ -81,7 +79,7 @@ class Handwritten:
             self.seconds["capacitive"] += time.perf_counter() - last
         return contact, distance, capacitance
 
-    def _contacts(self, world: Floats) -> NDArray[np.bool_]:
+    def _contacts(self, world: Floats) -> Flags:
         fcl = self._fcl
         for parts, body in zip(self._parts, self.scene.bodies, strict=True):
             T = world[body.link]

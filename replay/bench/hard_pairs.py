@@ -9,14 +9,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.engines import Body
 from replay.bench.inputs import box, rotations
 from replay.bench.truth import placed, signed_distance
 from replay.numerics import transforms
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 UNDETERMINED = 1e-12
 """Nearer to touching than this, as part of the scene's size, either boolean is right."""

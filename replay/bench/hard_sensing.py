@@ -9,12 +9,11 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.cone_truth import nearest_in_cone
 from replay.bench.inputs import box, rotations, unit
+from replay.numerics.arrays import Floats
 
-Floats = NDArray[np.float64]
 Cones = tuple[Floats, Floats, Floats]
 """Triangles (n, 3, 3), axes (n, 3), apertures (n,); the apex is the origin."""
 

@@ -8,14 +8,12 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import MissingPackageError
 from replay.geometry.mesh import load_mesh
 from replay.geometry.primitives import cuboid
 from replay.numerics import transforms
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 PHANTOM_FILES = {1_000: "adult_male_reduced_1000t.stl", 26_756: "adult_male.stl"}
 """Files of the package pyskindose by their number of triangles; their unit is the centimetre."""

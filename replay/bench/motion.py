@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench import carm
 from replay.bench.engines import PEERS, coal_geometry, fcl_geometry
@@ -17,9 +16,9 @@ from replay.bench.truth import proven_distance
 from replay.collision.columns import Level
 from replay.collision.pipeline import CollisionPipeline
 from replay.kinematics.linkage import LinkPoses
+from replay.numerics.arrays import Flags
 from replay.simulation import BLOCK_FRAMES
 
-Flags = NDArray[np.bool_]
 Answer = Callable[[], Flags]
 
 TITLE = "a motion: contacts of 66 pairs in every frame"

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from replay.bench import goals
-from replay.bench.report import LEAST_ERROR, Plot, Report, cells_of, pareto_front
+from replay.bench.report import LEAST_ERROR, LogLogPlot, Report, cells_of, pareto_front
 
 
 def page(reports: Sequence[Report], facts: Mapping[str, str]) -> str:
@@ -53,11 +53,11 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 _MARKED = {"met": "met", "missed": "missed", "wrong": "missed"}
 
 
-def _base64(plot: Plot) -> str:
+def _base64(plot: LogLogPlot) -> str:
     return base64.b64encode(png(plot)).decode("ascii")
 
 
-def png(*plots: Plot) -> bytes:
+def png(*plots: LogLogPlot) -> bytes:
     """Return plots side by side as a PNG picture."""
     from matplotlib.figure import Figure
 
@@ -69,7 +69,7 @@ def png(*plots: Plot) -> bytes:
     return buffer.getvalue()
 
 
-def _draw(plot: Plot, axes: Any) -> None:
+def _draw(plot: LogLogPlot, axes: Any) -> None:
     axes.set(xlabel=plot.x_label, ylabel=plot.y_label, title=plot.title)
     drawn = {
         name: sorted((point[0], max(point[1], LEAST_ERROR)) for point in points) for name, points in plot.lines.items()

@@ -30,7 +30,7 @@ PACKAGES = (
 
 
 @dataclass(frozen=True)
-class Plot:
+class LogLogPlot:
     """A log-log plot: one line (or cloud) of (x, y) per name.
 
     Attributes:
@@ -75,7 +75,7 @@ class Report:
     tables: dict[str, list[Row]] = field(default_factory=dict)
     grids: dict[str, Grid] = field(default_factory=dict)
     goals: list[Goal] = field(default_factory=list)
-    plots: list[Plot] = field(default_factory=list)
+    plots: list[LogLogPlot] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
@@ -126,14 +126,14 @@ def _processor() -> str:
 
 def pareto_plot(
     title: str, rows: Sequence[Row], error: str, groups: dict[str, str] | None = None, *, headline: bool = False
-) -> Plot:
+) -> LogLogPlot:
     """Return error over time per query for the rows that did not fail, the Pareto front marked.
 
     Args:
         title, error: texts; `error` says what the error is measured in.
         rows: of one case.
         groups: name of the line a method belongs to; its own name where it is not listed.
-        headline: see `Plot`.
+        headline: see `LogLogPlot`.
     """
     lines: dict[str, list[tuple[float, float]]] = {}
     crossed = []
@@ -143,7 +143,7 @@ def pareto_plot(
             lines.setdefault(name, []).append((row.median, row.worst_error))
             if row.missed:
                 crossed.append((row.median, row.worst_error))
-    return Plot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed, headline=headline)
+    return LogLogPlot(title, "s per query", error, lines, joined=True, front=True, crossed=crossed, headline=headline)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import Level
 from replay.collision.pair_frames import PairFrames
 from replay.collision.pipeline import NarrowPhase
 from replay.kinematics.linkage import LinkPoses
 from replay.kinematics.motion import sample
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.recording.record import record_blocks
 from replay.scenario.layout import Layout
 from replay.scenario.methods import Model
@@ -24,8 +24,6 @@ from replay.scenario.model import Scenario
 from replay.scenario.scene import build
 from replay.sensing.kinds import KINDS
 from replay.simulation import BLOCK_FRAMES, FrameBlock, Simulation
-
-Floats = NDArray[np.float64]
 
 _RECORDINGS = 7
 """How often frames are recorded: libraries are loaded on the first use, and a file takes its time now and then."""
@@ -35,7 +33,7 @@ _RECORDINGS = 7
 class Readings:
     """What n frames say: contacts (n, P), distances (n, D) [m] with NaN for nothing, capacitances (n, C) [F]."""
 
-    contact: NDArray[np.bool_]
+    contact: Flags
     distance: Floats
     capacitance: Floats
 
@@ -151,7 +149,7 @@ class Runner:
         return spent
 
     def _timed(self, narrow_phase: NarrowPhase) -> NarrowPhase:
-        def decide(frames: PairFrames, limit: float, counts: NDArray[np.int64]) -> None:
+        def decide(frames: PairFrames, limit: float, counts: Integers) -> None:
             begin = time.perf_counter()
             narrow_phase(frames, limit, counts)
             self._narrow += time.perf_counter() - begin

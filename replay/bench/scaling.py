@@ -12,17 +12,17 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.batch.run import Execution, run_all
 from replay.bench import broad_phase
 from replay.bench.inputs import around, torus
 from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
 from replay.bench.pipeline import FAST, MODELS, scenario
-from replay.bench.report import Grid, Plot, Report
+from replay.bench.report import Grid, LogLogPlot, Report
 from replay.errors import ScenarioError
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.scenario.load import load_sources
 from replay.scenario.model import Scenario
 from replay.scenario.scene import build
@@ -32,7 +32,6 @@ from replay.sensing.distance import DistanceSensor, DistanceSuite
 from replay.sensing.target import Target, make_target
 from replay.simulation import Simulation, simulate
 
-Floats = NDArray[np.float64]
 Points = dict[str, list[tuple[float, float]]]
 
 FRAMES = (64, 256, 1024, 4096)
@@ -223,7 +222,7 @@ def _law(report: Report, title: str, x: str, y: str, lines: Points, rows: list[R
     """Add table, plot and the fitted exponent of each line, over all sizes and over the larger half."""
     report.tables[title] = rows
     named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}
-    report.plots.append(Plot(title, x, y, named, joined=True))
+    report.plots.append(LogLogPlot(title, x, y, named, joined=True))
     for name, points in lines.items():
         half = min(len(points) // 2, len(points) - 2)
         large = exponent(points[half:])

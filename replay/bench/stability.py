@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.bench.arena import Outcome, ask
+from replay.bench.arena import Reply, ask
 from replay.bench.contestants import Answer, contestants
 from replay.bench.engines import Body
 from replay.bench.goals import Goal
@@ -69,7 +69,7 @@ def examine(
     """
     families = list(dict.fromkeys(question["family"] for question in questions))
     judge = _JUDGES[subject]
-    answered: dict[str, list[Outcome] | str] = {}
+    answered: dict[str, list[Reply] | str] = {}
     for name, (package, answer) in (several or contestants(subject)).items():
         answered[name] = _missing(package) or ask(answer, questions, patience=patience)
     lines = []
@@ -85,7 +85,7 @@ def examine(
 
 
 def _count(
-    family: str, name: str, chosen: Sequence[tuple[Question, Outcome]], judge: Judge, tolerance: float
+    family: str, name: str, chosen: Sequence[tuple[Question, Reply]], judge: Judge, tolerance: float
 ) -> dict[str, Any]:
     line = _line(family, name, asked=len(chosen))
     worst = 0.0

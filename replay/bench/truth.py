@@ -11,14 +11,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.gjk import Status, distance
 from replay.geometry.hull import convex_hull
-
-Floats = NDArray[np.float64]
-Wide = NDArray[np.longdouble]
-Indices = NDArray[np.int64]
+from replay.numerics.arrays import Floats, Integers, Wide
 
 
 def proven_distance(a: Floats, b: Floats, T_a_b: Floats) -> tuple[float, float]:
@@ -82,11 +78,11 @@ def signed_distance(a: Wide, b: Wide) -> float:
     return float(min(_corners_to_faces(a, b), _corners_to_faces(b, a), _edges_to_edges(a, pairs_a, b, pairs_b)))
 
 
-def _choices(count: int, size: int) -> Indices:
+def _choices(count: int, size: int) -> Integers:
     return np.array(list(itertools.combinations(range(count), size)), dtype=np.int64).reshape(-1, size)
 
 
-def _edges(points: Wide, pairs: Indices) -> Wide:
+def _edges(points: Wide, pairs: Integers) -> Wide:
     return points[pairs[:, 1]] - points[pairs[:, 0]]
 
 
@@ -118,7 +114,7 @@ def _corners_to_faces(points: Wide, corners: Wide) -> np.longdouble:
     return np.longdouble(best)
 
 
-def _edges_to_edges(a: Wide, pairs_a: Indices, b: Wide, pairs_b: Indices) -> np.longdouble:
+def _edges_to_edges(a: Wide, pairs_a: Integers, b: Wide, pairs_b: Integers) -> np.longdouble:
     if len(pairs_a) == 0 or len(pairs_b) == 0:
         return np.longdouble(np.inf)
     u, v = _edges(a, pairs_a)[:, None], _edges(b, pairs_b)[None]

@@ -42,7 +42,7 @@ def diff(
 
     Exit codes: 0 the same, 1 different, 2 invalid or unreadable input.
     """
-    from replay.comparison.difference import Verdict
+    from replay.comparison.difference import DiffVerdict
     from replay.comparison.outputs import Outputs
     from replay.comparison.report_text import lines
     from replay.comparison.rules_file import read_rules
@@ -57,5 +57,5 @@ def diff(
         put(suggest(found).splitlines())
     else:
         say(form, lambda: lines(found, verbose=verbose), found.as_json)
-    codes = {Verdict.DIFFERENT: ExitCode.DIFFERENT, Verdict.UNREADABLE: ExitCode.INVALID}
+    codes = {DiffVerdict.DIFFERENT: ExitCode.DIFFERENT, DiffVerdict.UNREADABLE: ExitCode.INVALID}
     return codes.get(found.verdict, ExitCode.FINE)

@@ -57,6 +57,7 @@ def over() -> bool:
     """Ignore what comes while the interpreter ends; return whether the command was asked to stop before."""
     _settled.set()
     _handle(signal.SIG_IGN)
+    exec("")  # Python forgets that an interrupt once passed through an exec of text, for which `python -m` kills itself
     return _requested.is_set()
 
 

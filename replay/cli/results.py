@@ -35,14 +35,14 @@ def show(form: str, run: Run) -> None:
 
 def totals(run: Run) -> list[str]:
     """Return the last line of several scenarios: "30 scenarios: 28 passed, 2 broken (near, far)"."""
-    from replay.batch.case import Status
+    from replay.batch.case import CaseStatus
 
-    ends: dict[Status, list[str]] = {}
+    ends: dict[CaseStatus, list[str]] = {}
     for result in run.results:
         ends.setdefault(result.status, []).append(result.name)
     parts = []
     for end, names in ends.items():
-        which = "" if end in (Status.PASSED, Status.INTERRUPTED) else f" ({', '.join(names)})"
+        which = "" if end in (CaseStatus.PASSED, CaseStatus.INTERRUPTED) else f" ({', '.join(names)})"
         parts.append(f"{len(names)} {end.value}{which}")
     return [f"{len(run.results)} scenarios: {', '.join(parts)}"] if len(run.results) > 1 else []
 

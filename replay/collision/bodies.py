@@ -15,12 +15,9 @@ from replay.errors import InvalidValue
 from replay.geometry.bounds import fit_aabb, fit_sphere, principal_obb
 from replay.geometry.convex import ConvexSets, convex_sets
 from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import record
 from replay.numerics.rows import distinct_rows
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 Bounds = Literal["obb", "obb_vertices", "aabb", "sphere"]
 Pieces = Literal["exact", "convex", "hull"]

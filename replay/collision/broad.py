@@ -10,17 +10,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import AABB, SPHERE, VOLUMES_TYPE, Volumes
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, SKIP, PairFrames
 from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, inlined_kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 COUNTS = 4
 BY_BLOCK, BY_REPEAT, BY_SPHERE, BY_VOLUME = range(COUNTS)

@@ -17,15 +17,12 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import Volumes
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.kinematics.linkage import LinkPoses
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def near_pairs(volumes: Volumes, links: Integers, poses: LinkPoses, limit: float) -> Integers:

@@ -6,15 +6,11 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.columns import Columns, Field
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
+MARGIN = 0.05
+"""[m] Clearances up to this one are computed where a scenario does not say another."""
 
 _LEVELS = {"bounds": 3, "contact": 4}
 _CHART = "Clearance of pairs that are near [m]"

@@ -16,12 +16,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.numerics import double_double as dd
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import leaf_kernel
-
-Floats = NDArray[np.float64]
 
 DEGENERATE = 2.0**-66
 """A face whose normal is shorter than this times the product of its edges proposes nothing (cosines keep 2^-38)."""

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.bodies import Bodies
 from replay.collision.narrow import CONTACTS, RUNS, SEEN_INSIDE
@@ -23,9 +22,7 @@ from replay.collision.pairs import CollisionBody
 from replay.collision.traversal import QUERIES, contains_part
 from replay.errors import MissingPackageError
 from replay.geometry.hull import convex_hull
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from replay.numerics.arrays import Floats, Integers
 
 
 class FclEngine:

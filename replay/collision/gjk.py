@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.collision import gjk_exact, gjk_pair
 from replay.collision.gjk_exact import DIRECTION, DISTANCE, LOWER, POINT_A, POINT_B
@@ -17,8 +17,7 @@ from replay.collision.gjk_pair import LARGEST_COORDINATE, MIDDLE, RIGID_TOLERANC
 from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Bytes, Floats
 
 
 class Status(enum.Enum):
@@ -158,7 +157,7 @@ def distance(
     return Separation(status, float(answer[DISTANCE]), float(answer[LOWER]), point_a, point_b, direction)
 
 
-def intersects(a: Convex, b: Convex, T_a_b: ArrayLike) -> NDArray[np.uint8]:
+def intersects(a: Convex, b: Convex, T_a_b: ArrayLike) -> Bytes:
     """Return the `Status` values (n,) of b at the poses T_a_b (n, 4, 4) in a's frame, an order faster than one by one.
 
     Raises:
@@ -169,7 +168,7 @@ def intersects(a: Convex, b: Convex, T_a_b: ArrayLike) -> NDArray[np.uint8]:
     return _ask_all(a, b, T_a_b, 0.0)[0]
 
 
-def distances(a: Convex, b: Convex, T_a_b: ArrayLike) -> tuple[NDArray[np.uint8], Floats]:
+def distances(a: Convex, b: Convex, T_a_b: ArrayLike) -> tuple[Bytes, Floats]:
     """Return `Status` values (n,) and distances (n,) [m], 0 unless separated; see `intersects`.
 
     Accuracy: relative 1e-12, plus 3e-15 of the bodies' reach and offset (tests/collision/test_gjk.py).
@@ -177,7 +176,7 @@ def distances(a: Convex, b: Convex, T_a_b: ArrayLike) -> tuple[NDArray[np.uint8]
     return _ask_all(a, b, T_a_b, math.inf)
 
 
-def _ask_all(a: Convex, b: Convex, T_a_b: ArrayLike, cutoff: float) -> tuple[NDArray[np.uint8], Floats]:
+def _ask_all(a: Convex, b: Convex, T_a_b: ArrayLike, cutoff: float) -> tuple[Bytes, Floats]:
     poses = as_floats("T_a_b", T_a_b, (None, 4, 4))
     faulty = gjk_pair.first_not_rigid(poses)
     if faulty >= 0:

@@ -11,15 +11,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import exact_simplex
 from replay.collision.support import Sets, candidates
 from replay.numerics import double_double as dd
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 SEPARATED = 0
 CONTACT = 1

@@ -26,7 +26,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import simplex as faces
 from replay.collision.exact_simplex import WITNESS
@@ -46,9 +45,9 @@ from replay.collision.gjk_exact import (
     write_witness,
 )
 from replay.collision.support import Sets, farthest
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import inlined_kernel
-
-Floats = NDArray[np.float64]
+from replay.numerics.triples import dot
 
 ITERATIONS = 48
 """Cap of the loop in doubles; random pairs of 642-vertex hulls need at most about 20. Beyond it, double-doubles."""
@@ -101,7 +100,7 @@ def query(
     for _ in range(ITERATIONS):
         if n == 0:  # the way from mean to mean is a point of A - B too, though of no simplex
             d = _between_means(a, set_a, b, set_b, rotation, translation)
-            square = faces.dot(d, d)
+            square = dot(d, d)
             if not square > bound * bound:
                 d, square = (size, 0.0, 0.0), size * size
         else:
@@ -127,9 +126,9 @@ def query(
         j = farthest(b, begin_b, end_b, table_b, side_b, x, y, z)
         x, y, z = mapped(b, j, rotation, translation)
         w = (a.flat[3 * i] - x, a.flat[3 * i + 1] - y, a.flat[3 * i + 2] - z)
-        along = faces.dot(d, w)
+        along = dot(d, w)
         if along > 0.0:
-            lower = along / math.sqrt(faces.dot(d, d)) - bound
+            lower = along / math.sqrt(dot(d, d)) - bound
             if lower > result[LOWER]:
                 result[LOWER] = lower
                 result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = -d[0], -d[1], -d[2]
@@ -189,7 +188,7 @@ def _nearest(points: Floats, n: int, size: float) -> faces.Near4:
     """Return `simplex.nearest_on_tetrahedron` of the first n points, 1 to 4."""
     a = (points[0, 0], points[0, 1], points[0, 2])
     if n == 1:
-        return faces.OUTSIDE, a, faces.dot(a, a), 1.0, 0.0, 0.0, 0.0
+        return faces.OUTSIDE, a, dot(a, a), 1.0, 0.0, 0.0, 0.0
     b = (points[1, 0], points[1, 1], points[1, 2])
     if n == 2:
         point, square, wa, wb = faces.nearest_on_segment(a, b)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.gjk_exact import (
     CONTACT,
@@ -26,10 +25,8 @@ from replay.collision.gjk_exact import (
 )
 from replay.collision.gjk_kernel import query
 from replay.collision.support import Sets
+from replay.numerics.arrays import Bytes, Floats
 from replay.numerics.jit import kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 RIGID_TOLERANCE = 1e-6
 """Largest accepted |R^T R - I|. The vertices are mapped by the matrix as given, so a pose that is rigid to this
@@ -184,9 +181,7 @@ def _to_world(
 
 
 @kernel
-def ask_all(
-    a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status: NDArray[np.uint8], distance: Floats
-) -> None:
+def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status: Bytes, distance: Floats) -> None:
     """Write status and distance of set 0 of a and set 0 of b at each of T_a_b (n, 4, 4); each query starts afresh.
 
     Args:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.collision import traversal
 from replay.collision.bodies import BODIES_TYPE, Bodies
 from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, workspace
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, PairFrames
 from replay.collision.traversal import STACK, closest, contains_part
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)

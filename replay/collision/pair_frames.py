@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import boolean, float64, int64, uint8
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import record
 
 SKIP, RUN, REPEAT = 0, 1, 2
@@ -27,13 +27,13 @@ class PairFrames(NamedTuple):
         undecided: (n, P).
     """
 
-    pairs: NDArray[np.int64]
-    poses: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    task: NDArray[np.uint8]
-    level: NDArray[np.uint8]
-    clearance: NDArray[np.float64]
-    undecided: NDArray[np.bool_]
+    pairs: Integers
+    poses: Floats
+    turns: Floats
+    task: Bytes
+    level: Bytes
+    clearance: Floats
+    undecided: Flags
 
 
 PAIR_FRAMES_TYPE = record(
@@ -48,7 +48,7 @@ PAIR_FRAMES_TYPE = record(
 )
 
 
-def unanswered(pairs: NDArray[np.int64], poses: NDArray[np.float64], turns: NDArray[np.float64]) -> PairFrames:
+def unanswered(pairs: Integers, poses: Floats, turns: Floats) -> PairFrames:
     """Return pairs in the frames of their poses, clear and without clearances as yet."""
     shape = poses.shape[1], len(pairs)
     return PairFrames(

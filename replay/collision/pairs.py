@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.collision.globs import Globs
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import JointType, Linkage
-
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from replay.language.globs import Globs
+from replay.numerics.arrays import Flags, Integers
 
 MOST_PAIRS = 500_000
 """Most pairs that are listed, those of 1 000 bodies: results hold a column for each, 11 bytes a frame, which is 1.4 GB

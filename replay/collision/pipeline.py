@@ -14,12 +14,11 @@ from functools import partial
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision import broad, candidates, narrow, relative, scan, support, traversal
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
-from replay.collision.columns import CollisionColumns, CollisionEntries
+from replay.collision.columns import MARGIN, CollisionColumns, CollisionEntries
 from replay.collision.counters import Counters
 from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, Pair, PairRules
@@ -28,10 +27,8 @@ from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
 from replay.geometry import box_search, calipers, decomposition, principal_axes, smallest_ball, tree
 from replay.kinematics.linkage import Linkage, LinkPoses
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import entries_of
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LINK_PAIRS_AT_ONCE = 512
 """Relative poses held at a time: 512 link pairs of 256 frames are 16 MiB."""
@@ -93,7 +90,7 @@ class CollisionPipeline:
         narrowphase: Literal["gjk", "fcl"] = "gjk",
         pieces: Pieces = "exact",
         clearance: Literal["never", "near", "always"] = "near",
-        margin: float = 0.05,
+        margin: float = MARGIN,
         savings: bool = True,
     ) -> None:
         if clearance not in ("never", "near", "always"):
@@ -282,9 +279,9 @@ class _Found:
 
     columns: Integers
     rows: Integers
-    level: NDArray[np.uint8]
+    level: Bytes
     clearance: Floats
-    undecided: NDArray[np.bool_]
+    undecided: Flags
 
 
 def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings: bool) -> NarrowPhase:

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.kinematics.linkage import Linkage
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class RelativePoses:

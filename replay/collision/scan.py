@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import BODIES_TYPE, Bodies
 from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, SEPARATED, STEPS, UNDECIDED, Workspace, workspace
@@ -14,10 +13,8 @@ from replay.collision.gjk_kernel import ROUNDING, query
 from replay.collision.narrow import SEEN_INSIDE, hold_each_other, is_asked_for, write_found
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.traversal import IN_DOUBLE_DOUBLE, ITERATIONS, QUERIES
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @leaf_kernel

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.pairs import Pair, PairRules
 from replay.errors import InvalidValue
-
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from replay.numerics.arrays import Flags, Integers
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,11 @@ from __future__ import annotations
 import math
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
+from replay.numerics.triples import Triple, cross, dot, minus
 
-Point = tuple[float, float, float]
-Near2 = tuple[Point, float, float, float]
-Near3 = tuple[Point, float, float, float, float]
-Near4 = tuple[int, Point, float, float, float, float, float]
+Near2 = tuple[Triple, float, float, float]
+Near3 = tuple[Triple, float, float, float, float]
+Near4 = tuple[int, Triple, float, float, float, float, float]
 
 OUTSIDE = 0
 INSIDE = 1
@@ -38,27 +38,9 @@ DETERMINANT_ERROR = 64.0 * 2.0**-53
 
 
 @inlined_kernel
-def dot(u: Point, v: Point) -> float:
-    """Return the inner product."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@inlined_kernel
-def cross(u: Point, v: Point) -> Point:
-    """Return the vector product."""
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-@inlined_kernel
-def difference(u: Point, v: Point) -> Point:
-    """Return u - v."""
-    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
-
-
-@inlined_kernel
-def nearest_on_segment(a: Point, b: Point) -> Near2:
+def nearest_on_segment(a: Triple, b: Triple) -> Near2:
     """Return direction and squared distance of the segment's point nearest to the origin, and the shares of a and b."""
-    e = difference(b, a)
+    e = minus(b, a)
     along = -dot(a, e)
     total = dot(e, e)
     if along <= 0.0 or total == 0.0:
@@ -71,9 +53,9 @@ def nearest_on_segment(a: Point, b: Point) -> Near2:
 
 
 @inlined_kernel
-def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
+def nearest_on_triangle(a: Triple, b: Triple, c: Triple) -> Near3:
     """Return direction and squared distance of the triangle's point nearest to the origin, and the corners' shares."""
-    u, v = difference(b, a), difference(c, a)
+    u, v = minus(b, a), minus(c, a)
     # corner regions
     au, av = -dot(u, a), -dot(v, a)
     if au <= 0.0 and av <= 0.0:
@@ -109,7 +91,7 @@ def nearest_on_triangle(a: Point, b: Point, c: Point) -> Near3:
 
 
 @leaf_kernel
-def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
+def _nearest_on_border(a: Triple, b: Triple, c: Triple) -> Near3:
     """Let the three edges of a triangle compete: for one that is degenerate or contradicts itself."""
     point, square, wa, wb = nearest_on_segment(a, b)
     wc = 0.0
@@ -123,7 +105,7 @@ def _nearest_on_border(a: Point, b: Point, c: Point) -> Near3:
 
 
 @inlined_kernel
-def nearest_on_tetrahedron(a: Point, b: Point, c: Point, d: Point, size: float) -> Near4:
+def nearest_on_tetrahedron(a: Triple, b: Triple, c: Triple, d: Triple, size: float) -> Near4:
     """Return (OUTSIDE | INSIDE | UNSURE, direction, squared distance, shares of a, b, c, d).
 
     UNSURE if rounding may put the origin on either side. The point is the tetrahedron's nearest to the origin if

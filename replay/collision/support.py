@@ -15,12 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, inlined_kernel, kernel, record
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FEW = 16
 """Sets of so many vertices or fewer are looked at vertex by vertex: as fast as finding the cell."""

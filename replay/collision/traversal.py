@@ -12,17 +12,14 @@ import math
 
 import numpy as np
 from numba import boolean, float64, int64
-from numpy.typing import NDArray
 
 from replay.collision.bodies import BODIES_TYPE, Bodies
 from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, LOWER, SEPARATED, STEPS, UNDECIDED, Workspace
 from replay.collision.gjk_kernel import ROUNDING, query
 from replay.geometry.containment import inside
 from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 STACK = 4 * MAX_DEPTH
 """Room for waiting node pairs: each of the at most 2 MAX_DEPTH splits on the way down leaves one behind."""

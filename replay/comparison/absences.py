@@ -7,11 +7,11 @@ import hashlib
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison.difference import Absence
 from replay.comparison.rules import Rules
 from replay.comparison.signals import Group, Signal
+from replay.numerics.arrays import Integers
 
 Key = tuple[str, str]
 Groups = Mapping[Key, Group]
@@ -45,7 +45,7 @@ def with_new_names(
     extra: tuple[Absence, ...],
     groups_a: Groups,
     groups_b: Groups,
-    rows: tuple[NDArray[np.int64] | None, NDArray[np.int64] | None],
+    rows: tuple[Integers | None, Integers | None],
 ) -> tuple[tuple[Absence, ...], tuple[Absence, ...]]:
     """Say of what is missing under which other name it is there, where exactly one extra has the same readings.
 
@@ -73,9 +73,7 @@ def _same_as(item: Absence, other: Absence | None) -> Absence:
     return item if other is None else dataclasses.replace(item, same_as=(other.topic, other.name))
 
 
-def _fingerprints(
-    items: Iterable[Absence], groups: Groups, rows: NDArray[np.int64] | None
-) -> list[tuple[tuple[str, ...], str]]:
+def _fingerprints(items: Iterable[Absence], groups: Groups, rows: Integers | None) -> list[tuple[tuple[str, ...], str]]:
     """Return of each item its fields and a digest of its values, without the name that may have changed."""
     places = {signal: (group, k) for group in groups.values() for k, signal in enumerate(group.signals)}
     prints = []

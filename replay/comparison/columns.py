@@ -8,21 +8,18 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison import difference as result
-from replay.comparison.events import Matched, Track, match, tracks
-from replay.comparison.numbers import Errors, Flags, compare_numbers, compare_rotations
+from replay.comparison.events import Matched, StateTrack, match, tracks
+from replay.comparison.numbers import Errors, compare_numbers, compare_rotations
 from replay.comparison.rules import Rule, Rules, Tolerance
-from replay.comparison.signals import Column, Group, Signal, unify_categories
+from replay.comparison.signals import Group, Signal, unify_categories
+from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Field, Kind
-
-Indices = NDArray[np.int64]
+from replay.numerics.constants import SECOND
 
 _BLOCK_VALUES = 1 << 20
 """Values that are compared at once while equal columns are looked for, which bounds the temporary memory to 16 MiB."""
-
-SECOND = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +31,9 @@ class MatchedFrames:
         baseline, candidate: (F,) their indices in each recording; None when these are all frames in order.
     """
 
-    time: NDArray[np.int64]
-    baseline: Indices | None
-    candidate: Indices | None
+    time: Integers
+    baseline: Integers | None
+    candidate: Integers | None
 
     def baseline_moment(self, index: int) -> result.Moment:
         """Return the frame of the baseline at an index of the matched frames."""
@@ -46,7 +43,7 @@ class MatchedFrames:
         """Return the frame of the candidate at an index of the matched frames."""
         return self._moment(self.candidate, index)
 
-    def _moment(self, rows: Indices | None, index: int) -> result.Moment:
+    def _moment(self, rows: Integers | None, index: int) -> result.Moment:
         return result.Moment(int(index if rows is None else rows[index]), float(self.time[index]) / SECOND)
 
 
@@ -93,7 +90,7 @@ def compare_groups(
             yield dataclasses.replace(item, decides=False) if tolerance.ignore else item
 
 
-def _changed(a: Column, b: Column, frames: MatchedFrames, columns_a: Indices, columns_b: Indices) -> Flags:
+def _changed(a: Column, b: Column, frames: MatchedFrames, columns_a: Integers, columns_b: Integers) -> Flags:
     """Return which columns are not the same bits in all matched frames."""
     changed = np.zeros(len(columns_a), dtype=bool)
     if not len(columns_a):
@@ -107,7 +104,7 @@ def _changed(a: Column, b: Column, frames: MatchedFrames, columns_a: Indices, co
     return changed
 
 
-def _block(values: Column, rows: Indices | None, window: slice, columns: Indices) -> Column:
+def _block(values: Column, rows: Integers | None, window: slice, columns: Integers) -> Column:
     block = values[window] if rows is None else values[rows[window]]
     if len(columns) != values.shape[1] or not np.array_equal(columns, np.arange(len(columns))):
         block = block[:, columns]
@@ -116,7 +113,7 @@ def _block(values: Column, rows: Indices | None, window: slice, columns: Indices
     return block
 
 
-def _take(column: Column, rows: Indices | None) -> Column:
+def _take(column: Column, rows: Integers | None) -> Column:
     return np.ascontiguousarray(column if rows is None else column[rows])
 
 
@@ -146,7 +143,7 @@ def _summarise(
         return None
     decisive = outside if outside.any() else differs
 
-    def worst(error: NDArray[np.float64]) -> result.Worst | None:
+    def worst(error: Floats) -> result.Worst | None:
         candidates = differs & np.isfinite(error)
         if not candidates.any():
             return None
@@ -180,7 +177,7 @@ def _compare_states(
     kept = np.arange(len(x)) if echo is None else np.flatnonzero(~echo)
     echoes = 0 if echo is None else int((x[echo] != y[echo]).sum())
     x, y = x[kept], y[kept]
-    events: list[result.Event] = []
+    events: list[result.EventDifference] = []
     count = outside = lone = 0
     max_shift, max_frames = 0.0, 0
     for track in tracks(field, x, y, categories):
@@ -220,12 +217,12 @@ _START = result.Moment(0, 0.0)
 @dataclass(frozen=True, eq=False)
 class _Shifts:
     paired: Flags
-    seconds: NDArray[np.float64]
-    frames: Indices
+    seconds: Floats
+    frames: Integers
     allowed: Flags
 
     @staticmethod
-    def of(matched: Matched, frames: MatchedFrames, kept: Indices, tolerance: Tolerance) -> _Shifts:
+    def of(matched: Matched, frames: MatchedFrames, kept: Integers, tolerance: Tolerance) -> _Shifts:
         paired = (matched.baseline >= 0) & (matched.candidate >= 0)
         from_, to = kept[matched.baseline], kept[matched.candidate]
         nanoseconds = frames.time[to] - frames.time[from_]
@@ -237,14 +234,14 @@ class _Shifts:
 
 
 def _listed(
-    track: Track, matched: Matched, shifts: _Shifts, frames: MatchedFrames, kept: Indices
-) -> Sequence[result.Event]:
+    track: StateTrack, matched: Matched, shifts: _Shifts, frames: MatchedFrames, kept: Integers
+) -> Sequence[result.EventDifference]:
     events = []
     for k in range(min(len(matched.state), result.LISTED_EVENTS)):
         in_a, in_b = int(matched.baseline[k]), int(matched.candidate[k])
         paired = bool(shifts.paired[k])
         events.append(
-            result.Event(
+            result.EventDifference(
                 what=track.label(int(matched.state[k])),
                 fate=result.Fate.SHIFTED if paired else result.Fate.VANISHED if in_a >= 0 else result.Fate.APPEARED,
                 baseline=None if in_a < 0 else frames.baseline_moment(int(kept[in_a])),

@@ -6,14 +6,15 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison.absences import absences, with_new_names
-from replay.comparison.columns import SECOND, Gates, MatchedFrames, compare_groups
+from replay.comparison.columns import Gates, MatchedFrames, compare_groups
 from replay.comparison.difference import Change, Difference, Frames, Moment, SignalDifference
 from replay.comparison.provenance import file_changes, provenance_changes
 from replay.comparison.rules import Rule, Rules
 from replay.comparison.signals import Group, groups
+from replay.numerics.arrays import Integers
+from replay.numerics.constants import SECOND
 from replay.recording.reader import Recording
 
 FRAMES = "/frames"
@@ -98,7 +99,7 @@ def _deciding_names(found: Difference) -> Iterator[str]:
         yield FRAMES
 
 
-def match_frames(a: NDArray[np.int64], b: NDArray[np.int64], rules: Rules) -> tuple[Frames, MatchedFrames]:
+def match_frames(a: Integers, b: Integers, rules: Rules) -> tuple[Frames, MatchedFrames]:
     """Return which frames two runs have in common, by integer nanoseconds, and what there is to say of the others."""
     if np.array_equal(a, b):
         return Frames(matched=len(a)), MatchedFrames(a, None, None)
@@ -115,7 +116,7 @@ def match_frames(a: NDArray[np.int64], b: NDArray[np.int64], rules: Rules) -> tu
     return frames, MatchedFrames(time, rows_a, rows_b)
 
 
-def _moment(time: NDArray[np.int64], only: NDArray[np.int64]) -> Moment | None:
+def _moment(time: Integers, only: Integers) -> Moment | None:
     return Moment(int(np.searchsorted(time, only[0])), float(only[0]) / SECOND) if len(only) else None
 
 

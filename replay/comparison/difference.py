@@ -16,7 +16,7 @@ LISTED_EVENTS = 1000
 """Events of one signal that are kept one by one; all are counted."""
 
 
-class Verdict(enum.Enum):
+class DiffVerdict(enum.Enum):
     """Whether two runs are the same as far as the rules say."""
 
     SAME = "same"
@@ -60,7 +60,7 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Event:
+class EventDifference:
     """A change of state that is not at the same time in both runs.
 
     Attributes:
@@ -107,7 +107,7 @@ class SignalDifference:
     nan: int = 0
     infinite: int = 0
     echo: int = 0
-    events: tuple[Event, ...] = ()
+    events: tuple[EventDifference, ...] = ()
     event_count: int = 0
     lone_events: int = 0
     max_shift: float = 0.0
@@ -177,7 +177,7 @@ class Difference:
     strict_provenance: bool = False
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> DiffVerdict:
         """Different when anything decides."""
         decides = (
             (self.strict_provenance and self.provenance)
@@ -186,7 +186,7 @@ class Difference:
             or any(absence.decides for absence in (*self.missing, *self.extra))
             or any(signal.decides for signal in self.signals)
         )
-        return Verdict.DIFFERENT if decides else Verdict.SAME
+        return DiffVerdict.DIFFERENT if decides else DiffVerdict.SAME
 
     @property
     def deciding(self) -> tuple[SignalDifference, ...]:

@@ -6,19 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.comparison.signals import Column
+from replay.numerics.arrays import Column, Integers
 from replay.numerics.columns import Field, Kind
-
-Frames = NDArray[np.int64]
 
 MAX_OPTIMAL = 2000
 """Unmatched events of one track up to which the correspondence of least total shift is searched; above, in order."""
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class StateTrack:
     """One sequence of states whose changes are events.
 
     Attributes:
@@ -46,12 +43,12 @@ class Matched:
         baseline, candidate: (E,) index of the frame in which it is, -1 in the run that lacks the event.
     """
 
-    state: Frames
-    baseline: Frames
-    candidate: Frames
+    state: Integers
+    baseline: Integers
+    candidate: Integers
 
 
-def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[str, ...]) -> Iterator[Track]:
+def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[str, ...]) -> Iterator[StateTrack]:
     """Yield the tracks of a pair of state columns.
 
     Ordered states give one track a threshold: a run that goes from clear to contact at once and one that touches the
@@ -63,16 +60,16 @@ def tracks(field: Field, baseline: Column, candidate: Column, categories: tuple[
     if field.kind is Kind.CATEGORY:
         rest = 0 if field.name == "case" else -1
         labels: dict[int | None, str] = {k - 1: f"{field.name} becomes {text}" for k, text in enumerate(categories)}
-        yield Track(baseline, candidate, rest, labels | {None: f"{field.name} becomes {{}}"})
+        yield StateTrack(baseline, candidate, rest, labels | {None: f"{field.name} becomes {{}}"})
         return
     highest = max(len(field.begins), int(baseline.max()), int(candidate.max()))
     for threshold in range(1, highest + 1):
         name = field.begins[threshold - 1] if threshold <= len(field.begins) else f"{field.name} {threshold}"
         above = (baseline >= threshold).astype(np.int64), (candidate >= threshold).astype(np.int64)
-        yield Track(*above, rest=0, labels={1: f"{name} begins", 0: f"{name} ends"})
+        yield StateTrack(*above, rest=0, labels={1: f"{name} begins", 0: f"{name} ends"})
 
 
-def match(track: Track) -> Matched:
+def match(track: StateTrack) -> Matched:
     """Return the events of a track that are not in the same frame in both runs, and which corresponds to which.
 
     Events that both runs have in the same frame are fixed. Between two of them, the events that lead to the same state
@@ -105,7 +102,7 @@ def match(track: Track) -> Matched:
     )
 
 
-def _events(column: Column, rest: int) -> tuple[Frames, Frames]:
+def _events(column: Column, rest: int) -> tuple[Integers, Integers]:
     """Return the states entered and the frames in which they are."""
     before = np.empty_like(column)
     before[:1] = rest
@@ -114,7 +111,7 @@ def _events(column: Column, rest: int) -> tuple[Frames, Frames]:
     return column[frames], frames
 
 
-def _partners(key_a: Frames, key_b: Frames, fixed: Frames, span: int) -> Frames:
+def _partners(key_a: Integers, key_b: Integers, fixed: Integers, span: int) -> Integers:
     """Return for each event of a the index of the corresponding event of b, or -1; keys are state · span + frame."""
     partner = np.full(len(key_a), -1, dtype=np.int64)
     if not len(key_a) or not len(key_b):
@@ -136,13 +133,13 @@ def _partners(key_a: Frames, key_b: Frames, fixed: Frames, span: int) -> Frames:
     return partner
 
 
-def _gaps(keys: Frames, fixed: Frames, span: int) -> Frames:
+def _gaps(keys: Integers, fixed: Integers, span: int) -> Integers:
     """Return a number per event: equal where the same state is entered between the same fixed events; ascending."""
-    gap: Frames = np.searchsorted(fixed, keys) + (len(fixed) + 1) * (keys // span)
+    gap: Integers = np.searchsorted(fixed, keys) + (len(fixed) + 1) * (keys // span)
     return gap
 
 
-def _least_shift(a: Frames, b: Frames) -> Frames:
+def _least_shift(a: Integers, b: Integers) -> Integers:
     """Match all of the shorter of two ascending sequences to the longer, in order, with the least sum of |a - b|.
 
     Dynamic programme over (short, long): cost[i][j] = min(cost[i][j - 1], cost[i - 1][j - 1] + |short_i - long_j|).

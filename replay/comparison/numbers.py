@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.comparison.rules import Tolerance
-from replay.comparison.signals import Column
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from replay.numerics.arrays import Column, Flags, Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from replay.comparison import report_html, report_junit
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
-from replay.comparison.runs import Case, Pair, RunDifference
+from replay.comparison.runs import Case, RecordingPair, RunDifference
 from replay.logs.part_file import write_file
 
 
@@ -27,7 +27,7 @@ class Outputs:
         self._rrd = rrd
         self._drawn: dict[str, tuple[Plot, ...]] = {}
 
-    def visit(self, case: Case, pair: Pair) -> None:
+    def visit(self, case: Case, pair: RecordingPair) -> None:
         """Take one scenario; WriteError when its overlay cannot be written."""
         if self._html is not None:
             self._drawn[case.name] = plots(case.difference, pair)
@@ -35,7 +35,7 @@ class Outputs:
             return
         if not case.of_folders:
             write_overlay(self._rrd, case, pair)
-        elif case.difference.verdict is Verdict.DIFFERENT:
+        elif case.difference.verdict is DiffVerdict.DIFFERENT:
             write_overlay(self._rrd / f"{case.name}.rrd", case, pair)
 
     def write(self, found: RunDifference) -> None:

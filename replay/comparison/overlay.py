@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.comparison import wording
-from replay.comparison.difference import Event, Moment, SignalDifference
+from replay.comparison.difference import EventDifference, Moment, SignalDifference
 from replay.comparison.log_changes import read_scene
-from replay.comparison.plots import Curve, Curves
+from replay.comparison.plots import ComparedCurve, Curves
 from replay.comparison.report_text import text
-from replay.comparison.runs import Case, Pair, RunDifference
+from replay.comparison.runs import Case, RecordingPair, RunDifference
+from replay.numerics.arrays import Floats, Integers
 from replay.recording.blueprint import SCENE, TIMELINE, eye_of, scene_view
 from replay.recording.reader import Recording, read
 from replay.recording.rerun_file import RerunFile
@@ -71,12 +72,12 @@ class _Side:
         name = recording.provenance.scenario
         return _Side(SceneView(name, description="", links=poses.layout.links, bodies=tuple(bodies)), poses)
 
-    def extent(self) -> NDArray[np.float64]:
+    def extent(self) -> Floats:
         """Return points (n, 3) [m] in world coordinates that span the scene and where it moves."""
         return extent(self.scene, self.poses.link_poses)
 
 
-def write_overlay(path: str | Path, case: Case, pair: Pair, *, overwrite: bool = True) -> None:
+def write_overlay(path: str | Path, case: Case, pair: RecordingPair, *, overwrite: bool = True) -> None:
     """Write the recording that shows both runs of a scenario.
 
     Args:
@@ -142,7 +143,7 @@ def _log_poses(stream: Any, side: str, recording: Recording) -> None:
         _send(stream, [side, "scene", name], recording.time[rows], np.flatnonzero(rows), columns)
 
 
-def _log_curve(stream: Any, item: SignalDifference, curve: Curve, baseline: Recording) -> None:
+def _log_curve(stream: Any, item: SignalDifference, curve: ComparedCurve, baseline: Recording) -> None:
     import rerun as rr
 
     time = np.round(curve.seconds * 1e9).astype(np.int64)
@@ -174,7 +175,7 @@ def _log_marks(stream: Any, marks: list[_Mark]) -> None:
     _send(stream, [DIFFERENCE, "moments"], time, np.array([mark.at.frame for mark in marks]), columns)
 
 
-def _send(stream: Any, path: list[str], time: NDArray[np.int64], frames: NDArray[Any], *columns: Any) -> None:
+def _send(stream: Any, path: list[str], time: Integers, frames: NDArray[Any], *columns: Any) -> None:
     import rerun as rr
 
     index = [
@@ -201,7 +202,7 @@ def _marks(case: Case) -> Iterator[_Mark]:
             yield _Mark(worst.at, level, f"{name}: differs most, by {error}")
 
 
-def _when(event: Event) -> Moment:
+def _when(event: EventDifference) -> Moment:
     at = event.baseline or event.candidate
     assert at is not None
     return at

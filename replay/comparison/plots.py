@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.comparison.columns import SECOND
 from replay.comparison.diff import match_frames
 from replay.comparison.difference import Difference, SignalDifference
 from replay.comparison.numbers import compare_numbers, compare_rotations
 from replay.comparison.rules import EXACT, Rules
-from replay.comparison.runs import Pair
-from replay.comparison.signals import Column, groups, unify_categories
+from replay.comparison.runs import RecordingPair
+from replay.comparison.signals import groups, unify_categories
+from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Kind
-
-Floats = NDArray[np.float64]
+from replay.numerics.constants import SECOND
 
 WIDTH, HEIGHT, LOWER = 720.0, 150.0, 70.0
 """Width of a drawing, height of its upper area (values) and of its lower one (differences) [px]."""
@@ -27,7 +25,7 @@ _BUCKETS = 700
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class ComparedCurve:
     """A signal of two runs in their common frames, (F,) each.
 
     Attributes:
@@ -43,7 +41,7 @@ class Curve:
     candidate: Floats
     error: Floats
     limit: Floats
-    outside: NDArray[np.bool_]
+    outside: Flags
     steps: bool
 
 
@@ -82,13 +80,13 @@ class Plot:
 class Curves:
     """The signals that two recordings share, as curves."""
 
-    def __init__(self, pair: Pair) -> None:
+    def __init__(self, pair: RecordingPair) -> None:
         _, self._frames = match_frames(pair.baseline.time, pair.candidate.time, Rules())
         self._groups_a = {(g.key, signal): (g, k) for g in groups(pair.baseline) for k, signal in enumerate(g.signals)}
         self._groups_b = {(g.key, signal): (g, k) for g in groups(pair.candidate) for k, signal in enumerate(g.signals)}
         self.seconds = self._frames.time / SECOND
 
-    def curve(self, item: SignalDifference) -> Curve:
+    def curve(self, item: SignalDifference) -> ComparedCurve:
         """Return what both runs say of a signal."""
         key = (item.signal.topic.split("/")[1], item.signal.field), item.signal
         (group_a, k), (group_b, j) = self._groups_a[key], self._groups_b[key]
@@ -98,28 +96,30 @@ class Curves:
         tolerance = EXACT if item.rule is None else item.rule.tolerance
         if group_a.field.kind.is_state:
             a, b = x.astype(np.float64), y.astype(np.float64)
-            return Curve(self.seconds, a, b, np.abs(a - b), np.zeros(len(a)), a != b, steps=True)
+            return ComparedCurve(self.seconds, a, b, np.abs(a - b), np.zeros(len(a)), a != b, steps=True)
         if group_a.field.kind is Kind.ROTATION:
             errors = compare_rotations(x, y, tolerance)
             limit = np.full(len(x), tolerance.abs)
-            return Curve(self.seconds, np.zeros(len(x)), errors.error, errors.error, limit, errors.outside, steps=False)
+            return ComparedCurve(
+                self.seconds, np.zeros(len(x)), errors.error, errors.error, limit, errors.outside, steps=False
+            )
         errors = compare_numbers(x, y, tolerance)
         with np.errstate(over="ignore", invalid="ignore"):
             limit = np.maximum(tolerance.abs, tolerance.rel * np.fmax(np.abs(x), np.abs(y)))
-        return Curve(self.seconds, x, y, errors.error, limit, errors.outside, steps=False)
+        return ComparedCurve(self.seconds, x, y, errors.error, limit, errors.outside, steps=False)
 
 
-def _rows(column: Column, rows: NDArray[np.int64] | None) -> Column:
+def _rows(column: Column, rows: Integers | None) -> Column:
     return column if rows is None else column[rows]
 
 
-def plots(found: Difference, pair: Pair) -> tuple[Plot, ...]:
+def plots(found: Difference, pair: RecordingPair) -> tuple[Plot, ...]:
     """Return the drawings of the first `SHOWN` signals that differ."""
     curves = Curves(pair)
     return tuple(_plot(item, curves.curve(item)) for item in found.signals[:SHOWN])
 
 
-def _plot(item: SignalDifference, curve: Curve) -> Plot:
+def _plot(item: SignalDifference, curve: ComparedCurve) -> Plot:
     begin, end = float(curve.seconds[0]), float(curve.seconds[-1])
     width = end - begin or 1.0
     x = (curve.seconds - begin) / width * WIDTH

@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Any
 
 from replay.comparison import wording
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.plots import HEIGHT, LOWER, SHOWN, WIDTH, Plot
 from replay.comparison.runs import Case, RunDifference
 from replay.errors import printable
@@ -16,7 +16,7 @@ from replay.errors import printable
 
 def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
     """Return the page, cases that differ first; `plots` holds the drawings of each case, by its name."""
-    ordered = sorted(found.cases, key=lambda case: case.difference.verdict is not Verdict.DIFFERENT)
+    ordered = sorted(found.cases, key=lambda case: case.difference.verdict is not DiffVerdict.DIFFERENT)
     cases = [(case, plots.get(case.name, ())) for case in ordered]
     page: str = _template("report.html.j2").render(
         found=found, cases=cases, wording=wording, details=details, style=style()

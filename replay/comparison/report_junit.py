@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from replay.comparison import wording
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.report_text import text
 from replay.comparison.runs import Case, RunDifference
 from replay.errors import printable
@@ -29,7 +29,7 @@ def junit(found: RunDifference) -> bytes:
     suite = ElementTree.SubElement(root, "testsuite", counts)
     for case in found.cases:
         element = _case(suite, case.name)
-        if case.difference.verdict is Verdict.DIFFERENT:
+        if case.difference.verdict is DiffVerdict.DIFFERENT:
             message = wording.summary(case.difference)
             _child(element, "failure", _details(found, case), message=message, type="different")
     for one in found.unreadable:

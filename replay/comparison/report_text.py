@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from replay.comparison import wording
-from replay.comparison.difference import Change, Difference, SignalDifference, Verdict
+from replay.comparison.difference import Change, Difference, DiffVerdict, SignalDifference
 from replay.comparison.runs import Case, RunDifference
 from replay.errors import count, printable
 
@@ -26,7 +26,7 @@ def lines(found: RunDifference, *, verbose: bool = False) -> Iterator[str]:
     for case in found.cases:
         yield from _case(case, verbose, above)
         above = case.difference.provenance or above
-    yield from (f"{Verdict.UNREADABLE.value}: {one.name}: {one.error}" for one in found.unreadable)
+    yield from (f"{DiffVerdict.UNREADABLE.value}: {one.name}: {one.error}" for one in found.unreadable)
     for where, names in (("missing in the candidate", found.missing), ("only in the candidate", found.extra)):
         for name in names:
             yield f"scenario {name}: {where}{' [ignored]' if name in found.ignored else ''}"
@@ -39,7 +39,7 @@ def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]
     found = case.difference
     yield f"{found.verdict.value}: {case.name}: {wording.summary(found)}"
     repeats = found.provenance == above
-    if found.provenance and (verbose or not repeats or found.verdict is Verdict.DIFFERENT):
+    if found.provenance and (verbose or not repeats or found.verdict is DiffVerdict.DIFFERENT):
         decides = "decides" if found.strict_provenance else "does not decide"
         yield f"  provenance ({decides}){': as above' if repeats else ''}"
         if not repeats:

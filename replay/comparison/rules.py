@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import datetime
-import fnmatch
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
+
+from replay.language.globs import any_of
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Rule:
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
-        return re.compile("|".join(fnmatch.translate(pattern) for pattern in self.signals))
+        return any_of(self.signals)
 
     def matches(self, full_name: str) -> bool:
         """Return whether the rule is for the signal of this full name."""
@@ -97,8 +98,3 @@ class Rules:
         """Return the tolerance that applies to a signal."""
         rule = self.rule(full_name)
         return EXACT if rule is None else rule.tolerance
-
-
-def literal_pattern(full_name: str) -> str:
-    """Return the pattern that matches this name and no other."""
-    return re.sub(r"([*?[])", r"[\1]", full_name)

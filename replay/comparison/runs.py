@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.comparison.diff import compare
-from replay.comparison.difference import JSON_VERSION, Change, Difference, Verdict
+from replay.comparison.difference import JSON_VERSION, Change, Difference, DiffVerdict
 from replay.comparison.log_changes import SCENE, equal_topics, scene_changes, schema_changes
 from replay.comparison.rules import Rules
 from replay.comparison.run_folder import recordings_in
@@ -24,7 +24,7 @@ SCENARIOS = "/scenarios"
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class RecordingPair:
     """Two recordings of one scenario, with what their files say beside the columns.
 
     Attributes:
@@ -82,18 +82,18 @@ class RunDifference:
     unreadable: tuple[Unreadable, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> DiffVerdict:
         """Unreadable when any scenario is; different when any is, or is missing or extra without a rule."""
         if self.unreadable:
-            return Verdict.UNREADABLE
+            return DiffVerdict.UNREADABLE
         alone = any(name not in self.ignored for name in (*self.missing, *self.extra))
-        differs = alone or any(case.difference.verdict is Verdict.DIFFERENT for case in self.cases)
-        return Verdict.DIFFERENT if differs else Verdict.SAME
+        differs = alone or any(case.difference.verdict is DiffVerdict.DIFFERENT for case in self.cases)
+        return DiffVerdict.DIFFERENT if differs else DiffVerdict.SAME
 
     @property
     def different(self) -> tuple[Case, ...]:
         """The scenarios that differ."""
-        return tuple(case for case in self.cases if case.difference.verdict is Verdict.DIFFERENT)
+        return tuple(case for case in self.cases if case.difference.verdict is DiffVerdict.DIFFERENT)
 
     def as_json(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -133,7 +133,7 @@ def diff(
         strict_provenance: other versions, models and inputs make the verdict "different".
 
     Returns:
-        Everything that differs; `.verdict` is `Verdict.SAME` or `Verdict.DIFFERENT`.
+        Everything that differs; `.verdict` is `DiffVerdict.SAME` or `DiffVerdict.DIFFERENT`.
 
     Raises:
         RecordingError: a file cannot be read or is no recording.
@@ -146,13 +146,13 @@ def diff(
         rules = read_rules(rules, today=today)
     if isinstance(baseline, Recording) or isinstance(candidate, Recording):
         a, b = (x if isinstance(x, Recording) else read(x) for x in (baseline, candidate))
-        pair = Pair(a, b)
+        pair = RecordingPair(a, b)
         return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
     pair = read_pair(baseline, candidate, rules=rules)
     return diff_pair(pair, rules=rules, strict_provenance=strict_provenance)
 
 
-def read_pair(baseline: str | Path, candidate: str | Path, *, rules: Rules | None = None) -> Pair:
+def read_pair(baseline: str | Path, candidate: str | Path, *, rules: Rules | None = None) -> RecordingPair:
     """Read two recordings, without the topics that are the same bytes in both and stand for the same signals.
 
     Under a rule that lets no NaN pass, not even in both, all topics are read.
@@ -184,7 +184,7 @@ def _identity(file: Path) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None) -> Pair:
+def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None) -> RecordingPair:
     with McapLog(baseline) as log_a, McapLog(candidate) as log_b:
         layout_a, layout_b = read_provenance(log_a).layout, read_provenance(log_b).layout
         bytes_equal = equal_topics(log_a, log_b)
@@ -200,7 +200,7 @@ def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None)
             {channel.topic for channel in log.channels.values()} & own_topics(layout)
             for log, layout in ((log_a, layout_a), (log_b, layout_b))
         ]
-    return Pair(
+    return RecordingPair(
         read(baseline, topics=names[0] - equal if equal else None),
         read(candidate, topics=names[1] - equal if equal else None),
         (*scene, *lost),
@@ -209,7 +209,7 @@ def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None)
     )
 
 
-def diff_pair(pair: Pair, *, rules: Rules | None, strict_provenance: bool = False) -> Difference:
+def diff_pair(pair: RecordingPair, *, rules: Rules | None, strict_provenance: bool = False) -> Difference:
     """Return how the recordings of a pair differ."""
     return compare(
         pair.baseline,
@@ -228,7 +228,7 @@ def diff_runs(
     *,
     rules: Rules | None = None,
     strict_provenance: bool = False,
-    visit: Callable[[Case, Pair], None] | None = None,
+    visit: Callable[[Case, RecordingPair], None] | None = None,
 ) -> RunDifference:
     """Return how two files, or two run folders, differ; scenarios of folders correspond by their paths inside.
 

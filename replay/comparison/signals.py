@@ -14,20 +14,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.numerics.arrays import Column
 from replay.numerics.columns import Field, Kind, components
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.recording.reader import Recording
     from replay.simulation import Layout
-
-Column = NDArray[Any]
 
 
 @dataclass(frozen=True, order=True, slots=True)

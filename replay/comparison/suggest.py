@@ -8,9 +8,10 @@ from decimal import ROUND_CEILING, Decimal
 
 from replay.comparison import wording
 from replay.comparison.difference import Difference, SignalDifference
-from replay.comparison.rules import EXACT, literal_pattern
+from replay.comparison.rules import EXACT
 from replay.comparison.runs import RunDifference
 from replay.errors import count
+from replay.language.globs import literal_glob
 
 MARK = "REVIEW"
 """Begins the reason of every suggested rule."""
@@ -106,7 +107,7 @@ def _rules(rules: dict[tuple[str, ...], list[str]]) -> Iterator[str]:
     yield "rules:"
     for lines, names in rules.items():
         yield "  - signal:"
-        yield from (f"      - {json.dumps(literal_pattern(name))}" for name in names)
+        yield from (f"      - {json.dumps(literal_glob(name))}" for name in names)
         yield from (f"    {line}" for line in lines)
         yield f'    reason: "{MARK}: say why this difference is acceptable"'
 

@@ -9,7 +9,7 @@ from replay.comparison.difference import (
     Absence,
     Change,
     Difference,
-    Event,
+    EventDifference,
     Fate,
     Frames,
     Moment,
@@ -71,7 +71,7 @@ def absence(item: Absence, where: str) -> str:
     return text
 
 
-def event(item: Event) -> str:
+def event(item: EventDifference) -> str:
     """Return one event in words."""
     allowed = " [allowed]" if item.allowed else ""
     if item.fate is Fate.SHIFTED:

@@ -15,6 +15,8 @@ from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles
 from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.rows import distinct_rows
 
 __all__ = [
@@ -30,9 +32,7 @@ __all__ = [
     "spheres_meet",
 ]
 
-Array = NDArray[np.float64]
 
-_EPS = float(np.finfo(np.float64).eps)
 _ULPS = 8.0
 """Volumes are this many roundings of their extent larger than the points' computed distances ask for.
 
@@ -49,7 +49,7 @@ _LARGEST = 1e300
 class Sphere:
     """The points within `radius` [m] of `center` (3,) [m]."""
 
-    center: Array
+    center: Floats
     radius: float
 
 
@@ -57,8 +57,8 @@ class Sphere:
 class Aabb:
     """The points x with |x - center| <= half_widths on each axis; both (3,) [m]."""
 
-    center: Array
-    half_widths: Array
+    center: Floats
+    half_widths: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +71,12 @@ class Obb:
         axes: (3, 3), rows are unit axes, right-handed.
     """
 
-    center: Array
-    half_widths: Array
-    axes: Array
+    center: Floats
+    half_widths: Floats
+    axes: Floats
 
 
-def fit_sphere(points: Array) -> Sphere:
+def fit_sphere(points: Floats) -> Sphere:
     """Return the smallest sphere around points (n, 3) [m], n >= 1.
 
     Raises:
@@ -90,20 +90,20 @@ def fit_sphere(points: Array) -> Sphere:
     center = origin + scale * smallest_ball_centre(local)
     x, y, z = ((points - center) / scale).T
     reach = float(np.sqrt(np.max(x * x + y * y + z * z)))
-    return Sphere(center, scale * reach * (1.0 + _ULPS * _EPS))
+    return Sphere(center, scale * reach * (1.0 + _ULPS * EPSILON))
 
 
-def fit_aabb(points: Array) -> Aabb:
+def fit_aabb(points: Floats) -> Aabb:
     """Return the smallest axis-aligned box around points (n, 3) [m], n >= 1; errors as `fit_sphere`."""
     points = _checked("points", points)
     lower, upper = points.min(axis=0), points.max(axis=0)
     center = 0.5 * lower + 0.5 * upper
     half_widths = np.maximum(upper - center, center - lower)
-    return Aabb(center, half_widths * (1.0 + _ULPS * _EPS))
+    return Aabb(center, half_widths * (1.0 + _ULPS * EPSILON))
 
 
 def principal_obb(
-    points: Array,
+    points: Floats,
     *,
     triangles: NDArray[np.generic] | None = None,
     method: Literal["triangles", "vertices"] = "triangles",
@@ -137,7 +137,7 @@ def principal_obb(
 
 
 def fit_obb(
-    points: Array,
+    points: Floats,
     *,
     triangles: NDArray[np.generic] | None = None,
     method: Literal["triangles", "vertices"] = "triangles",
@@ -159,18 +159,18 @@ def fit_obb(
     """
     box = principal_obb(points, triangles=triangles, method=method)
     local, origin, scale = to_unit_box(_checked("points", points))
-    if _volume(local, np.eye(3)) < _volume(local, box.axes) * (1.0 - _ULPS * _EPS):
+    if _volume(local, np.eye(3)) < _volume(local, box.axes) * (1.0 - _ULPS * EPSILON):
         return _tight(_checked("points", points), local, origin, scale, np.eye(3))
     return box
 
 
-def _volume(local: Array, axes: Array) -> float:
+def _volume(local: Floats, axes: Floats) -> float:
     """Return the volume of the box along axes around points of extent 1; flat boxes are compared by their area."""
     reach = _along(local[:, None], axes.T)
     return float(np.prod(np.maximum(reach.max(axis=0) - reach.min(axis=0), _FLAT)))
 
 
-def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array) -> Obb:
+def _tight(points: Floats, local: Floats, origin: Floats, scale: float, axes: Floats) -> Obb:
     """Return the box around the points along axes, sorted and signed in one way, containing them after rounding."""
     reach = _along(local[:, None], axes.T)
     order = np.argsort(reach.min(axis=0) - reach.max(axis=0), kind="stable")
@@ -186,23 +186,23 @@ def _tight(points: Array, local: Array, origin: Array, scale: float, axes: Array
         middle += (0.5 * low + 0.5 * high) * axis
     center = origin + scale * middle
     relative = (points - center) / scale
-    slack = _ULPS * _EPS * 2.0 * float(np.max(np.abs(relative)))
+    slack = _ULPS * EPSILON * 2.0 * float(np.max(np.abs(relative)))
     half_widths = np.abs(_along(relative[:, None], axes.T)).max(axis=0) + slack
     return Obb(center, scale * half_widths, axes)
 
 
-def _along(points: Array, axis: Array) -> Array:
+def _along(points: Floats, axis: Floats) -> Floats:
     """Return points . axis, the same on every machine; for several axes side by side their columns (3, k)."""
     return np.asarray(points[..., 0] * axis[0] + points[..., 1] * axis[1] + points[..., 2] * axis[2])
 
 
-def _signed(axis: Array) -> Array:
+def _signed(axis: Floats) -> Floats:
     """Return a unit axis or its opposite: the one whose largest component is positive."""
     axis = axis / np.sqrt(_along(axis, axis))
     return np.asarray(axis if axis[np.argmax(np.abs(axis))] > 0.0 else -axis)
 
 
-def _checked(name: str, points: Array) -> Array:
+def _checked(name: str, points: Floats) -> Floats:
     points = as_floats(name, points, (None, 3))
     if len(points) == 0:
         raise InvalidValue(name, "no points", "must have shape (n, 3) with n >= 1")
@@ -211,7 +211,7 @@ def _checked(name: str, points: Array) -> Array:
     return points
 
 
-def _corners(points: Array, triangles: NDArray[np.generic]) -> Array:
+def _corners(points: Floats, triangles: NDArray[np.generic]) -> Floats:
     try:
         triangles = np.asarray(triangles)
     except ValueError:

@@ -13,12 +13,10 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.calipers import turn_about
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Array = NDArray[np.float64]
 
 _GAIN = 1e-9  # a smaller box is smaller by more than this, relative
 _MOST_TURNS = 60
@@ -27,7 +25,7 @@ _FIRST_NUDGE, _LAST_NUDGE = 0.3, 1e-6  # [rad]
 _NUDGED = 3  # best boxes that are nudged
 
 
-def _nudge_axes() -> Array:
+def _nudge_axes() -> Floats:
     """Return the 26 unit directions to the faces, edges and corners of a cube."""
     steps = (-1, 0, 1)
     ways = [(x, y, z) for x in steps for y in steps for z in steps if (x, y, z) != (0, 0, 0)]
@@ -38,7 +36,7 @@ _NUDGES = _nudge_axes()
 
 
 @kernel
-def box_volume(points: Array, axes: Array) -> float:
+def box_volume(points: Floats, axes: Floats) -> float:
     """Return the volume of the box along axes (3, 3 rows) around points (n, 3)."""
     volume = 1.0
     for i in range(3):
@@ -53,7 +51,7 @@ def box_volume(points: Array, axes: Array) -> float:
 
 @entry(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1], int64, float64)
 @kernel
-def smallest_box(points: Array, axes: Array, trials: Array, starts: Array, kept: int, floor: float) -> Array:
+def smallest_box(points: Floats, axes: Floats, trials: Floats, starts: Floats, kept: int, floor: float) -> Floats:
     """Return the axes (3, 3 rows) of the smallest box found around points; never a larger one than along `axes`.
 
     Args:
@@ -108,14 +106,14 @@ def smallest_box(points: Array, axes: Array, trials: Array, starts: Array, kept:
 
 
 @kernel
-def _copy(source: Array, target: Array) -> None:
+def _copy(source: Floats, target: Floats) -> None:
     for i in range(3):
         for j in range(3):
             target[i, j] = source[i, j]
 
 
 @kernel
-def _turn(points: Array, axes: Array, volume: float, trial: Array) -> float:
+def _turn(points: Floats, axes: Floats, volume: float, trial: Floats) -> float:
     """Turn a box about its own axes in turn, in place, until none of the three makes it smaller; return its volume."""
     failed, i = 0, 0
     for _ in range(_MOST_TURNS):
@@ -133,7 +131,7 @@ def _turn(points: Array, axes: Array, volume: float, trial: Array) -> float:
 
 
 @kernel
-def _nudge(points: Array, axes: Array, volume: float, trial: Array, best: Array) -> float:
+def _nudge(points: Floats, axes: Floats, volume: float, trial: Floats, best: Floats) -> float:
     """Turn a box, in place, by small angles about the 26 directions, the best first; return its volume."""
     angle = _FIRST_NUDGE
     for _ in range(_MOST_NUDGES):

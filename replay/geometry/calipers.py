@@ -10,18 +10,16 @@ import math
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Array = NDArray[np.float64]
 
 _NOISE = 1e-14  # of points of extent 1: edges shorter than this have no direction
 
 
 @entry(float64[:, ::1], float64[::1], float64[:, ::1])
 @kernel
-def turn_about(points: Array, axis: Array, axes: Array) -> float:
+def turn_about(points: Floats, axis: Floats, axes: Floats) -> float:
     """Write the axes of the smallest box that has a side along a unit axis, and return its volume.
 
     The first row of axes is the axis; where the projection is a point, the others are any two.
@@ -58,7 +56,7 @@ def turn_about(points: Array, axis: Array, axes: Array) -> float:
 
 
 @kernel
-def _hull_of_projection(x: Array, y: Array) -> tuple[Array, Array]:
+def _hull_of_projection(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the hull of points in the plane, counter-clockwise (Andrew's monotone chain)."""
     n = len(x)
     order = np.argsort(x, kind="mergesort")
@@ -86,7 +84,7 @@ def _hull_of_projection(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 @kernel
-def _smallest_rectangle(x: Array, y: Array) -> tuple[float, float, float]:
+def _smallest_rectangle(x: Floats, y: Floats) -> tuple[float, float, float]:
     """Return (area, c, s): the rectangle along (c, s) and (-s, c) around a convex polygon, counter-clockwise.
 
     While the direction turns with the edges, the furthest points ahead, left and behind only move on.
@@ -123,7 +121,7 @@ def _smallest_rectangle(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 @kernel
-def _move_on(x: Array, y: Array, c: float, s: float, at: int) -> int:
+def _move_on(x: Floats, y: Floats, c: float, s: float, at: int) -> int:
     """Return the furthest point along (c, s), from `at` onwards; a step back by noise does not stop it."""
     n = len(x)
     best = at

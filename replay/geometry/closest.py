@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH, Tree
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel
-def squared_distance_to_box(point: Array, lower: Array, upper: Array) -> float:
+def squared_distance_to_box(point: Floats, lower: Floats, upper: Floats) -> float:
     """Return the squared distance [m^2] from a point to a box; 0 inside."""
     total = 0.0
     for axis in range(3):
@@ -33,7 +31,7 @@ def _segment(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -
 
 
 @kernel
-def squared_distance_to_triangle(point: Array, triangle: Array) -> float:
+def squared_distance_to_triangle(point: Floats, triangle: Floats) -> float:
     """Return the squared distance [m^2] from a point to a triangle (3, 3).
 
     With the point at the origin, its foot on the plane is inside iff it lies to the left of each edge, that is
@@ -59,13 +57,13 @@ def squared_distance_to_triangle(point: Array, triangle: Array) -> float:
 
 
 @kernel
-def distance_to_surface(point: Array, triangles: Array, tree: Tree) -> float:
+def distance_to_surface(point: Floats, triangles: Floats, tree: Tree) -> float:
     """Return the distance [m] from a point (3,) to triangles (n, 3, 3) under their tree."""
     return nearest_triangle(point, triangles, tree)[0]
 
 
 @kernel
-def nearest_triangle(point: Array, triangles: Array, tree: Tree) -> tuple[float, int]:
+def nearest_triangle(point: Floats, triangles: Floats, tree: Tree) -> tuple[float, int]:
     """Return (distance [m], index) of the triangle of (n, 3, 3) nearest to a point (3,), found through their tree."""
     waiting = np.empty(MAX_DEPTH, np.int64)
     bounds = np.empty(MAX_DEPTH)

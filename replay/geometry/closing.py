@@ -17,18 +17,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.geometry.solid_angle import winding_number
 from replay.geometry.winding import corner_indices, sides
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Array = NDArray[np.float64]
 
 MOST_OPEN: Final = 1.0 / 3.0
 """Surfaces whose winding number has a smaller defect than this, on average over their area, have an inside."""
 
-NO_CAPS: Final[Array] = np.zeros((0, 3, 3))
+NO_CAPS: Final[Floats] = np.zeros((0, 3, 3))
 
 _ASIDE = np.array([0.0711, 0.1093, 0.0837])
 """Where the apex lies about the middle of the boundary, in its extents: in no plane that a sheet is likely to have."""
@@ -49,7 +47,7 @@ class Openness(NamedTuple):
         return self.mean < MOST_OPEN
 
 
-def caps(triangles: Array) -> Array:
+def caps(triangles: Floats) -> Floats:
     """Return triangles (m, 3, 3) that close a surface (n, 3, 3) [m]; none if it is closed. Corners join where equal."""
     points, faces = corner_indices(triangles)
     found = sides(faces)
@@ -65,7 +63,7 @@ def caps(triangles: Array) -> Array:
     return np.stack([np.broadcast_to(apex, (len(ends), 3)), points[ends[:, 0]], points[ends[:, 1]]], axis=1)
 
 
-def openness(triangles: Array, closing: Array) -> Openness:
+def openness(triangles: Floats, closing: Floats) -> Openness:
     """Return how open a surface (n, 3, 3) [m] is that `closing` (m, 3, 3) closes, seen from up to 1000 triangles."""
     if len(closing) == 0:
         return Openness(0.0, 0.0)
@@ -81,7 +79,7 @@ def openness(triangles: Array, closing: Array) -> Openness:
 
 @entry(float64[:, ::1], float64[:, :, ::1])
 @kernel
-def _shares(points: Array, closing: Array) -> Array:
+def _shares(points: Floats, closing: Floats) -> Floats:
     result = np.empty(len(points))
     for k in range(len(points)):
         result[k] = winding_number(points[k], closing)

@@ -20,22 +20,20 @@ import math
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.closest import distance_to_surface
 from replay.geometry.closing import caps, openness
 from replay.geometry.solid_angle import winding_number
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, triangle_tree
+from replay.numerics.arrays import Flags, Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
 
-Array = NDArray[np.float64]
-
-_EPS = float(np.finfo(np.float64).eps)
 _UNSURE = -(2**31)
 
 
-def _directions(count: int) -> Array:
+def _directions(count: int) -> Floats:
     """Return directions spread over the sphere (a Fibonacci lattice), no component of which is zero."""
     z = [1.0 - (2.0 * k + 1.0) / count for k in range(count)]
     turn = [2.399963229728653 * k + 0.5 for k in range(count)]
@@ -50,9 +48,7 @@ def _directions(count: int) -> Array:
 _DIRECTIONS = _directions(8)
 
 
-def contains(
-    triangles: Array, points: Array, *, tree: Tree | None = None, closing: Array | None = None
-) -> NDArray[np.bool_]:
+def contains(triangles: Floats, points: Floats, *, tree: Tree | None = None, closing: Floats | None = None) -> Flags:
     """Return which points are inside, or within rounding of, a surface; none are in a sheet.
 
     Args:
@@ -81,7 +77,7 @@ def contains(
 
 @entry(float64[:, ::1], float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1])
 @kernel
-def each_inside(points: Array, triangles: Array, tree: Tree, closing: Array) -> NDArray[np.bool_]:
+def each_inside(points: Floats, triangles: Floats, tree: Tree, closing: Floats) -> Flags:
     """Return which points (m, 3) are inside, see `inside`."""
     result = np.empty(len(points), np.bool_)
     for k in range(len(points)):
@@ -90,7 +86,7 @@ def each_inside(points: Array, triangles: Array, tree: Tree, closing: Array) -> 
 
 
 @kernel
-def inside(point: Array, triangles: Array, tree: Tree, closing: Array) -> int:
+def inside(point: Floats, triangles: Floats, tree: Tree, closing: Floats) -> int:
     """Return 1 if the point (3,) is inside the surface triangles (n, 3, 3), or on it within rounding, else 0.
 
     `closing` (m, 3, 3) holds the caps that close it. What is outside the surface's box is outside.
@@ -112,13 +108,13 @@ def inside(point: Array, triangles: Array, tree: Tree, closing: Array) -> int:
     magnitude = 0.0
     for axis in range(3):
         magnitude = max(magnitude, abs(tree.lower[0, axis]), abs(tree.upper[0, axis]))
-    if distance_to_surface(point, triangles, tree) <= 64.0 * _EPS * magnitude:
+    if distance_to_surface(point, triangles, tree) <= 64.0 * EPSILON * magnitude:
         return 1
     return 1 if abs(winding_number(point, triangles)) > 0.5 else 0
 
 
 @kernel
-def _crossings(point: Array, d: Array, triangles: Array, tree: Tree) -> int:
+def _crossings(point: Floats, d: Floats, triangles: Floats, tree: Tree) -> int:
     """Return the signed number of crossings ahead of the point along d, or _UNSURE."""
     waiting = np.empty(MAX_DEPTH, np.int64)
     waiting[0] = 0
@@ -131,7 +127,7 @@ def _crossings(point: Array, d: Array, triangles: Array, tree: Tree) -> int:
             first = (tree.lower[node, axis] - point[axis]) / d[axis]
             last = (tree.upper[node, axis] - point[axis]) / d[axis]
             near, far = max(near, min(first, last)), min(far, max(first, last))
-        if near > far * (1.0 + 8.0 * _EPS):  # the factor covers the rounding of near and far, both >= 0
+        if near > far * (1.0 + 8.0 * EPSILON):  # the factor covers the rounding of near and far, both >= 0
             continue
         if tree.second[node] >= 0:
             waiting[size], waiting[size + 1] = tree.second[node], node + 1
@@ -146,7 +142,7 @@ def _crossings(point: Array, d: Array, triangles: Array, tree: Tree) -> int:
 
 
 @kernel
-def _crossing(point: Array, d: Array, triangle: Array) -> int:
+def _crossing(point: Floats, d: Floats, triangle: Floats) -> int:
     """Return +1 (outwards), -1 (inwards) or 0 (none) for the ray and one triangle, or _UNSURE.
 
     A difference rounds by eps / 2 relative, so a triple product of three of them, each term of at most |d| |b| |c|, is
@@ -160,11 +156,11 @@ def _crossing(point: Array, d: Array, triangle: Array) -> int:
     u = d[0] * nx + d[1] * ny + d[2] * nz
     v = d[0] * (cy * az - cz * ay) + d[1] * (cz * ax - cx * az) + d[2] * (cx * ay - cy * ax)
     w = d[0] * (ay * bz - az * by) + d[1] * (az * bx - ax * bz) + d[2] * (ax * by - ay * bx)
-    eu, ev, ew = 16.0 * _EPS * b * c, 16.0 * _EPS * c * a, 16.0 * _EPS * a * b
+    eu, ev, ew = 16.0 * EPSILON * b * c, 16.0 * EPSILON * c * a, 16.0 * EPSILON * a * b
     if (u > eu or v > ev or w > ew) and (u < -eu or v < -ev or w < -ew):
         return 0
     n = ax * nx + ay * ny + az * nz
-    en = 16.0 * _EPS * a * b * c
+    en = 16.0 * EPSILON * a * b * c
     if u > eu and v > ev and w > ew:
         return 1 if n > en else (0 if n < -en else _UNSURE)
     if u < -eu and v < -ev and w < -ew:

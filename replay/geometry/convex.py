@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.closing import NO_CAPS
 from replay.geometry.hull import extreme_points
 from replay.geometry.solid import Solid
 from replay.geometry.tree import Tree, build_tree
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 
 class ConvexSets(NamedTuple):
@@ -26,11 +24,11 @@ class ConvexSets(NamedTuple):
     them; `closing` are the caps of one that is not watertight, see `Solid`.
     """
 
-    vertices: NDArray[np.float64]  # (v, 3) [m]
-    first: NDArray[np.int64]  # (m + 1,)
+    vertices: Floats  # (v, 3) [m]
+    first: Integers  # (m + 1,)
     tree: Tree  # over the sets' boxes
     surface: bool
-    closing: NDArray[np.float64]  # (c, 3, 3) [m]
+    closing: Floats  # (c, 3, 3) [m]
 
 
 def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "exact") -> ConvexSets:
@@ -60,7 +58,7 @@ def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "e
     return from_pieces(decompose(solid).pieces)
 
 
-def from_pieces(pieces: Sequence[Array]) -> ConvexSets:
+def from_pieces(pieces: Sequence[Floats]) -> ConvexSets:
     """Return the sets of convex pieces given by vertices (k, 3) [m]; vertices inside a piece's hull are left out."""
     vertices = [extreme_points(distinct_rows(np.asarray(piece, dtype=np.float64) + 0.0).rows) for piece in pieces]
     first = np.concatenate([[0], np.cumsum([len(k) for k in vertices])]).astype(np.int64)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, components, sides
+from replay.geometry.winding import components, sides
+from replay.numerics.arrays import Flags, Integers
 from replay.numerics.rows import distinct_rows
 
 _MOST_TOGETHER = 200  # walls that close something only together
 
 
-def copies(faces: Indices) -> NDArray[np.bool_]:
+def copies(faces: Integers) -> Flags:
     """Return which faces (n,) have the corners of an earlier one, in either sense, and are not needed.
 
     Needed are the faces that closed bodies share: where two bodies meet in a wall that each of them has, one wall less
@@ -46,16 +46,16 @@ def copies(faces: Indices) -> NDArray[np.bool_]:
 class _Wall(NamedTuple):
     """A wall: its faces, the edges at them, and how many of its faces each of these has."""
 
-    faces: Indices
-    edges: Indices
-    number: Indices
+    faces: Integers
+    edges: Integers
+    number: Integers
 
     @property
-    def rim(self) -> Indices:
+    def rim(self) -> Integers:
         return np.asarray(self.edges[self.number % 2 == 1])
 
 
-def _needed(walls: list[_Wall], count: Indices) -> list[_Wall]:
+def _needed(walls: list[_Wall], count: Integers) -> list[_Wall]:
     """Return the walls that close what is open without them, alone or several that meet, and add them to `count`.
 
     Args:
@@ -93,7 +93,7 @@ def _needed(walls: list[_Wall], count: Indices) -> list[_Wall]:
     return found
 
 
-def _walls(faces: Indices, extra: Indices, edges: Indices, count: Indices) -> list[Indices]:
+def _walls(faces: Integers, extra: Integers, edges: Integers, count: Integers) -> list[Integers]:
     """Return the copies in groups, smallest first: neighbours across edges of no more than two faces that are kept."""
     found = sides(faces[extra])
     keys = found.ends[:, 0] * (int(faces.max()) + 1) + found.ends[:, 1]

@@ -19,7 +19,6 @@ from pathlib import Path
 
 import numpy as np
 from numba import boolean, float64
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.closest import nearest_triangle, squared_distance_to_triangle
@@ -29,10 +28,9 @@ from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid, signed_volume
 from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
 from replay.geometry.winding import corner_indices
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 REVISION = 1
 """Bumped when the pieces or the figures of the same body change; part of the cache's key."""
@@ -60,7 +58,7 @@ class Decomposition:
             piece's planes; thin parts can be lost altogether, and contacts with them are then not seen.
     """
 
-    pieces: tuple[Array, ...]
+    pieces: tuple[Floats, ...]
     volume_error: float
     protrusion: float
     missed: float
@@ -96,7 +94,7 @@ def closed_cavities(solid: Solid) -> int:
     return sum(volume < 0.0 for volume in volumes)
 
 
-def _decompose(triangles: Array) -> tuple[Array, ...]:
+def _decompose(triangles: Floats) -> tuple[Floats, ...]:
     import vhacdx
 
     local, centre, scale = to_unit_box(triangles.reshape(-1, 3))
@@ -109,25 +107,25 @@ def _decompose(triangles: Array) -> tuple[Array, ...]:
     return tuple(centre + scale * piece for piece in solid or [vertices])
 
 
-def _hull_triangles(piece: Array) -> Array:
+def _hull_triangles(piece: Floats) -> Floats:
     hull = convex_hull(piece)
     return np.zeros((0, 3, 3)) if hull is None else piece[hull.faces]
 
 
-def _volume_error(solid: Solid, pieces: tuple[Array, ...]) -> float:
+def _volume_error(solid: Solid, pieces: tuple[Floats, ...]) -> float:
     if not solid.watertight or solid.volume <= 0.0:
         return float("nan")
     return sum(signed_volume(_hull_triangles(piece)) for piece in pieces) / solid.volume - 1.0
 
 
-def _protrusion(solid: Solid, pieces: tuple[Array, ...]) -> float:
+def _protrusion(solid: Solid, pieces: tuple[Floats, ...]) -> float:
     faces = np.ascontiguousarray(np.concatenate([_hull_triangles(piece) for piece in pieces]))
     slack = PROTRUSION_TOLERANCE * float(np.ptp(solid.vertices, axis=0).max())
     tree = triangle_tree(solid.triangles)
     return float(_furthest(faces, solid.triangles, tree, solid.has_inside, np.ascontiguousarray(solid.closing), slack))
 
 
-def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
+def _missed(solid: Solid, pieces: tuple[Floats, ...]) -> float:
     corners = solid.vertices
     outside = np.full(len(corners), np.inf)
     for piece in pieces:
@@ -146,7 +144,7 @@ def _missed(solid: Solid, pieces: tuple[Array, ...]) -> float:
 
 @entry(float64[:, :, ::1], float64[:, :, ::1], TREE_TYPE, boolean, float64[:, :, ::1], float64)
 @kernel
-def _furthest(faces: Array, triangles: Array, tree: Tree, closed: bool, closing: Array, slack: float) -> float:
+def _furthest(faces: Floats, triangles: Floats, tree: Tree, closed: bool, closing: Floats, slack: float) -> float:
     """Return the largest distance of a point of faces outside the body, at most slack below the true one.
 
     A part of a face is bounded in two ways: distance changes by no more than the way gone, so it is at most the

@@ -10,11 +10,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, Sides, components, sides
-
-Array = NDArray[np.float64]
+from replay.geometry.winding import Sides, components, sides
+from replay.numerics.arrays import Floats, Integers
 
 ROUNDING: Final = 2.0**-22
 """How far from its plane a corner of a flat piece may be, in parts of the largest coordinate.
@@ -34,11 +32,11 @@ class Alike(NamedTuple):
         source: (m,) the face that has the same corners among those given.
     """
 
-    faces: Indices
-    source: Indices
+    faces: Integers
+    source: Integers
 
 
-def alike(points: Array, faces: Indices) -> Alike:
+def alike(points: Floats, faces: Integers) -> Alike:
     """Return faces (n, 3), indices of points (p, 3) [m], with one cut for all facets that have the same boundary."""
     every = np.arange(len(faces))
     points = points / np.max(np.abs(points))
@@ -65,7 +63,7 @@ def alike(points: Array, faces: Indices) -> Alike:
     return Alike(np.concatenate([faces[~dropped], *new]), np.concatenate([every[~dropped], *sources]))
 
 
-def _joined(points: Array, faces: Indices, found: Sides) -> Indices | None:
+def _joined(points: Floats, faces: Integers, found: Sides) -> Integers | None:
     """Return the pairs (k, 2) of faces that are in one facet; None where no facet can be there more than once.
 
     One that is has at each edge of its boundary either more than two faces, or two that lie on each other.
@@ -85,7 +83,7 @@ def _joined(points: Array, faces: Indices, found: Sides) -> Indices | None:
     return np.asarray(pairs[flat & (turn < 0.0)])
 
 
-def _same_boundary(found: Sides, label: Indices) -> list[list[int]]:
+def _same_boundary(found: Sides, label: Integers) -> list[list[int]]:
     """Return the facets that have the same boundary, in groups; those alone that are cut in different ways."""
     count = int(label.max()) + 1
     key, times = np.unique(found.edge * count + label[found.face], return_counts=True)
@@ -107,13 +105,13 @@ def _same_boundary(found: Sides, label: Indices) -> list[list[int]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _area(points: Array, faces: Indices) -> Array:
+def _area(points: Floats, faces: Integers) -> Floats:
     """Return twice the area of faces as a vector (3,)."""
     a, b, c = np.moveaxis(points[faces], 1, 0)
     return np.asarray(np.cross(b - a, c - a).sum(axis=0))
 
 
-def _in_one_plane(triangles: Array, area: Array) -> bool:
+def _in_one_plane(triangles: Floats, area: Floats) -> bool:
     """Return whether triangles (n, 3, 3) of the size of 1 lie in the plane that the vector `area` (3,) stands on."""
     size = float(np.sqrt(np.sum(area * area)))
     height = np.sum((triangles - triangles[0, 0]) * area, axis=2)

@@ -6,7 +6,7 @@ import math
 import struct
 
 from replay import limits
-from replay.geometry.glb_scene import Scene, read_scene
+from replay.geometry.glb_scene import GlbScene, read_scene
 
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
@@ -41,7 +41,7 @@ def bare(data: bytes) -> bytes:
     return b"glTF" + struct.pack("<4I", 2, 20 + len(text) + len(rest), len(text), _JSON) + text + rest
 
 
-def _chunks(data: bytes) -> tuple[Scene, bytes]:
+def _chunks(data: bytes) -> tuple[GlbScene, bytes]:
     """Return the description of the scene, and the binary data that come with it."""
     if data[:4] != b"glTF" or len(data) < 20:
         raise ValueError("it does not begin as one")
@@ -63,14 +63,14 @@ def _chunks(data: bytes) -> tuple[Scene, bytes]:
     return scene, b""
 
 
-def _check_extensions(scene: Scene) -> None:
+def _check_extensions(scene: GlbScene) -> None:
     needed = [name for name in scene.extensionsRequired if not name.startswith(_HARMLESS)]
     needed += [name for name in scene.extensionsUsed if name == "EXT_mesh_gpu_instancing"]
     if needed:
         raise ValueError(f"it needs the extension {needed[0][:60]}, which is not read; export it without compression")
 
 
-def _check_buffers(scene: Scene, binary: int) -> None:
+def _check_buffers(scene: GlbScene, binary: int) -> None:
     """Check that all numbers are in the file: where they are not, trimesh fills in zeros, as many as announced."""
     for buffer in scene.buffers:
         if buffer.uri is not None and not buffer.uri.startswith("data:"):
@@ -97,7 +97,7 @@ def _check_buffers(scene: Scene, binary: int) -> None:
             raise ValueError(f"it holds more numbers than the {limits.TRIANGLES} triangles that are read have")
 
 
-def _check_geometry(scene: Scene) -> None:
+def _check_geometry(scene: GlbScene) -> None:
     """Check that all triangles are read, and how many they are with every place that a body stands in."""
     triangles = []
     for mesh in scene.meshes:
@@ -122,7 +122,7 @@ def _check_geometry(scene: Scene) -> None:
         raise ValueError(f"it holds {max(placed, sum(triangles))} triangles; at most {limits.TRIANGLES} are read")
 
 
-def _check_nodes(scene: Scene) -> None:
+def _check_nodes(scene: GlbScene) -> None:
     """Check that the nodes form trees of finite transforms: of a node with two parents only one place is read."""
     nodes = scene.nodes
     parent: dict[int, int] = {}

@@ -15,20 +15,20 @@ _Index = Annotated[int, Field(ge=0, lt=1 << 31)]
 _Size = Annotated[int, Field(ge=0, lt=1 << 53)]
 
 
-class _Entry(BaseModel):
+class _GlbEntry(BaseModel):
     """Entries that are not named here are left out: pictures, materials, skins, motion, names."""
 
     model_config = ConfigDict(strict=True, extra="ignore")
 
 
-class Buffer(_Entry):
+class Buffer(_GlbEntry):
     """Bytes: those of the file's binary part, or a `data:` address."""
 
     byteLength: _Size
     uri: str | None = None
 
 
-class View(_Entry):
+class View(_GlbEntry):
     """A part of a buffer."""
 
     buffer: _Index
@@ -37,7 +37,7 @@ class View(_Entry):
     byteStride: Annotated[int, Field(ge=1, le=1 << 16)] | None = None
 
 
-class Accessor(_Entry):
+class Accessor(_GlbEntry):
     """Numbers in a view."""
 
     componentType: int
@@ -48,13 +48,13 @@ class Accessor(_Entry):
     sparse: dict[str, Any] | None = None
 
 
-class Attributes(_Entry):
+class Attributes(_GlbEntry):
     """What is known of the corners of a primitive."""
 
     POSITION: _Index
 
 
-class Primitive(_Entry):
+class Primitive(_GlbEntry):
     """A part of a mesh."""
 
     attributes: Attributes
@@ -62,13 +62,13 @@ class Primitive(_Entry):
     mode: Annotated[int, Field(ge=0, le=6)] = 4
 
 
-class Mesh(_Entry):
+class GlbMesh(_GlbEntry):
     """A body."""
 
     primitives: list[Primitive]
 
 
-class Node(_Entry):
+class GlbNode(_GlbEntry):
     """A body, or several nodes, in a place."""
 
     mesh: _Index | None = None
@@ -85,21 +85,21 @@ class Node(_Entry):
         return [number for part in parts for number in part or ()]
 
 
-class Roots(_Entry):
+class Roots(_GlbEntry):
     """The nodes that a scene begins with."""
 
     nodes: list[_Index] | None = None
 
 
-class Scene(_Entry):
+class GlbScene(_GlbEntry):
     """A whole description."""
 
     asset: dict[str, Any]
     buffers: list[Buffer] = []
     bufferViews: list[View] = []
     accessors: list[Accessor] = []
-    meshes: list[Mesh] = []
-    nodes: list[Node] = []
+    meshes: list[GlbMesh] = []
+    nodes: list[GlbNode] = []
     scenes: list[Roots] | None = None
     scene: _Index | None = None
     extensionsRequired: list[str] = []
@@ -111,7 +111,7 @@ class Scene(_Entry):
         return json.dumps({"asset": {"version": "2.0"}, **{key: value for key, value in kept.items() if value != []}})
 
 
-def read_scene(text: bytes) -> Scene:
+def read_scene(text: bytes) -> GlbScene:
     """Return a description as it stands in a file.
 
     Raises:
@@ -122,7 +122,7 @@ def read_scene(text: bytes) -> Scene:
     except ValueError as error:
         raise ValueError(f"the description of its scene is damaged: {error}") from None
     try:
-        scene = Scene.model_validate(values)
+        scene = GlbScene.model_validate(values)
     except ValidationError as error:
         raise ValueError(f"its description is not glTF 2: {_first(error)}") from None
     parts: dict[str, Sequence[Any]] = {

@@ -5,10 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from replay.numerics.arrays import Floats, Integers
 
 
 class Hull(NamedTuple):
@@ -19,11 +17,11 @@ class Hull(NamedTuple):
         faces: (f, 3) indices in the points given of the hull's triangles, counter-clockwise from outside.
     """
 
-    vertices: Indices
-    faces: Indices
+    vertices: Integers
+    faces: Integers
 
 
-def convex_hull(points: Array) -> Hull | None:
+def convex_hull(points: Floats) -> Hull | None:
     """Return the hull of finite points (n, 3), or None when they are flat (within rounding of their extent).
 
     Accuracy: Qhull merges facets within ~1e-15 of the extent; a point that close to a face may be left out.
@@ -40,7 +38,7 @@ def convex_hull(points: Array) -> Hull | None:
     return Hull(_vertices(hull), faces)
 
 
-def extreme_points(points: Array) -> Array:
+def extreme_points(points: Floats) -> Floats:
     """Return those of finite points (n, 3) that are vertices of their hull, in their order; of flat points all.
 
     Accuracy: as of `convex_hull`.
@@ -49,7 +47,7 @@ def extreme_points(points: Array) -> Array:
     return points if hull is None else points[_vertices(hull)]
 
 
-def to_unit_box(points: Array) -> tuple[Array, Array, float]:
+def to_unit_box(points: Floats) -> tuple[Floats, Floats, float]:
     """Return (local, centre, scale): points = centre + scale * local with local in about [-1, 1]; scale a power of two.
 
     A power of two makes the scaling exact, and subtracting a centre that is among the points' magnitudes loses
@@ -64,7 +62,7 @@ def to_unit_box(points: Array) -> tuple[Array, Array, float]:
     return np.ascontiguousarray((points - centre) / scale), centre, scale
 
 
-def _qhull(local: Array) -> Any:
+def _qhull(local: Floats) -> Any:
     from scipy.spatial import ConvexHull, QhullError
 
     if len(local) < 4:
@@ -75,5 +73,5 @@ def _qhull(local: Array) -> Any:
         return None
 
 
-def _vertices(hull: Any) -> Indices:
+def _vertices(hull: Any) -> Integers:
     return np.sort(hull.vertices).astype(np.int64)

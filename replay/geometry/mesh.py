@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MeshError, count
 from replay.geometry.closing import NO_CAPS, Openness, caps, openness
@@ -20,11 +19,11 @@ from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.geometry.weld import weld, weld_copies
-from replay.geometry.winding import Indices, Topology, corner_indices, topology
+from replay.geometry.winding import Topology, corner_indices, topology
+from replay.numerics.arrays import Flags, Floats, Integers
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
 
@@ -67,7 +66,7 @@ def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> S
         raise MeshError(name, error.rule) from error
 
 
-def solid_from_triangles(triangles: Array) -> Solid:
+def solid_from_triangles(triangles: Floats) -> Solid:
     """Return checked triangles (n, 3, 3) [m] as a solid; see `load_mesh` for what is checked and noted.
 
     Raises:
@@ -132,7 +131,7 @@ def solid_from_triangles(triangles: Array) -> Solid:
     return Solid(triangles, pieces=pieces, watertight=watertight, closing=closing, dropped=dropped, notes=tuple(notes))
 
 
-def _on_welding(points: Array, taken_for: Indices, effect: str) -> str:
+def _on_welding(points: Floats, taken_for: Integers, effect: str) -> str:
     moved = points - points[taken_for]
     furthest = float(np.sqrt(np.max(np.sum(moved * moved, axis=1))))
     which = count(int(np.count_nonzero(taken_for != np.arange(len(points)))), "corner")
@@ -170,21 +169,21 @@ def _on_openness(joints: Topology, found: Openness) -> str:
     return f"{what}inside is where the winding number is above 1/2; its largest defect on the surface is {defect}"
 
 
-def _have_area(triangles: Array) -> NDArray[np.bool_]:
+def _have_area(triangles: Floats) -> Flags:
     """Return which triangles (n,) are higher than the rounding of their own corners over their longest edge."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     edges = np.stack([b - a, c - b, a - c])
     longest = np.max(np.abs(edges), axis=(0, 2))
     safe = np.where(longest > 0.0, longest, 1.0)[:, None]
     cross = np.cross(edges[0] / safe, edges[2] / safe)
-    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * np.finfo(np.float64).eps))
+    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * EPSILON))
 
 
-def _convex_corners(triangles: Array) -> Array:
+def _convex_corners(triangles: Floats) -> Floats:
     return extreme_points(distinct_rows(triangles.reshape(-1, 3)).rows)
 
 
-def _is_convex(triangles: Array) -> bool:
+def _is_convex(triangles: Floats) -> bool:
     """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane, within rounding."""
     local, _, scale = to_unit_box(triangles.reshape(-1, 3))
     slack = ROUNDING * float(np.max(np.abs(triangles))) / scale
@@ -194,7 +193,7 @@ def _is_convex(triangles: Array) -> bool:
 
 @entry(float64[:, :, ::1], float64[:, ::1], TREE_TYPE, float64)
 @kernel
-def _all_below(triangles: Array, points: Array, tree: Tree, slack: float) -> bool:
+def _all_below(triangles: Floats, points: Floats, tree: Tree, slack: float) -> bool:
     """Return whether no point is further than slack outside the plane of any triangle (all of some area).
 
     Of a box of points, no point is further out than the corner that is furthest along the normal.

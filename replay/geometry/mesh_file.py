@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import MeshError
 from replay.geometry import glb_file, obj_file, ply_file, stl_check
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
+from replay.numerics.arrays import Floats, Integers
 
 FORMATS: Final = (".stl", ".obj", ".ply", ".glb")
 """File endings that can be read; upper case too."""
@@ -25,7 +25,7 @@ _UTF_8, _UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 """How texts may begin."""
 
 
-def read_faces(path: Path | str, data: bytes | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Integers]:
     """Return a file's vertices (v, 3) and triangles (f, 3) as it holds them; a GLB's scene in place.
 
     Polygons are split into triangles, see `polygons`. Pictures and materials are never loaded, and no index and no

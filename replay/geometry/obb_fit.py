@@ -20,9 +20,9 @@ from replay.geometry.calipers import turn_about
 from replay.geometry.hull import Hull
 from replay.geometry.principal_axes import eigen
 from replay.geometry.solid import signed_volume
+from replay.numerics.arrays import Floats
 from replay.numerics.rows import distinct_rows
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", bound=np.generic)
 
 NEARLY_REPEATED = 0.3
@@ -41,7 +41,7 @@ _LOOKED_AT = 2000  # faces that give trial axes
 _SMALL_HULL = 250  # vertices from which the effort goes down in proportion
 
 
-def box_axes(points: Array, hull: Hull | None, covariance: Array) -> Array:
+def box_axes(points: Floats, hull: Hull | None, covariance: Floats) -> Floats:
     """Return the unit axes (3, 3 rows) of the box around points (n, 3) of extent about 1.
 
     Args:
@@ -75,13 +75,13 @@ def _effort(bounds: tuple[int, int], vertices: int) -> int:
     return max(fewest, min(most, most * _SMALL_HULL // vertices))
 
 
-def _about(corners: Array, axis: Array) -> Array:
+def _about(corners: Floats, axis: Floats) -> Floats:
     result = np.empty((3, 3))
     turn_about(corners, np.ascontiguousarray(axis), result)
     return result
 
 
-def _trial_axes(points: Array, hull: Hull, most: int) -> Array:
+def _trial_axes(points: Floats, hull: Hull, most: int) -> Floats:
     """Return axes (t, 3) that the smallest box may have: face normals, edges, and normals to two edges.
 
     Of more than `most`, evenly spread ones of each kind are taken.
@@ -99,7 +99,7 @@ def _trial_axes(points: Array, hull: Hull, most: int) -> Array:
     return np.concatenate([normals, edges, _spread(across, most - len(normals) - len(edges))])
 
 
-def _distinct_directions(vectors: Array) -> Array:
+def _distinct_directions(vectors: Floats) -> Floats:
     """Return unit vectors along the lines of (n, 3) vectors, each line once (to 1e-7), zero vectors left out."""
     length = np.sqrt(np.sum(vectors * vectors, axis=1))
     unit = vectors[length > 1e-9] / length[length > 1e-9, None]
@@ -117,7 +117,7 @@ def _spread(rows: NDArray[Number], most: int) -> NDArray[Number]:
 
 
 @lru_cache
-def _spread_rotations(count: int) -> Array:
+def _spread_rotations(count: int) -> Floats:
     """Return rotations (count, 3, 3) spread over all orientations (super-Fibonacci spirals, Alexa 2022)."""
     phi, psi = math.sqrt(2.0), 1.533751168755204288118041
     result = np.empty((count, 3, 3))

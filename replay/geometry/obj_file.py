@@ -7,13 +7,13 @@ from array import array
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.geometry.polygons import triangulate
+from replay.numerics.arrays import Floats, Integers
 
 
-def read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read(data: bytes) -> tuple[Floats, Integers]:
     """Return the vertices (v, 3) and the triangles (f, 3) of an OBJ file.
 
     Polygons are split, see `polygons`. Groups, objects, normals, textures, colours, materials, points and lines are

@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.closing import caps, openness
 from replay.geometry.containment import contains
 from replay.geometry.parts import Parts
 from replay.geometry.solid import signed_volume
 from replay.geometry.tree import Tree, triangle_tree
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from replay.numerics.arrays import Flags, Floats, Integers
 
 _ROUNDING = 1e-14  # of volumes, in cubes of the largest extent
 _MOST_OPEN_PARTS = 200  # more are crumbs of one surface, and looked at together
@@ -30,9 +27,9 @@ class Shell(NamedTuple):
         volume: [m^3].
     """
 
-    which: NDArray[np.int64]
-    triangles: Array
-    closing: Array
+    which: Integers
+    triangles: Floats
+    closing: Floats
     volume: float
 
     @property
@@ -50,7 +47,7 @@ class Turned(NamedTuple):
     outermost: int
 
 
-def inside_out(triangles: Array, parts: Parts) -> Turned:
+def inside_out(triangles: Floats, parts: Parts) -> Turned:
     """Return which triangles (n, 3, 3) belong to parts that are inside out.
 
     A shell nested in another one is turned only with it: of the opposite sense it is a cavity, of the same sense solid.
@@ -66,7 +63,7 @@ def inside_out(triangles: Array, parts: Parts) -> Turned:
     return Turned(faces, sum(shells[k].is_inside_out for k in roots), len(roots))
 
 
-def _shells(triangles: Array, parts: Parts) -> list[Shell]:
+def _shells(triangles: Floats, parts: Parts) -> list[Shell]:
     order = np.argsort(parts.label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(parts.label[order])) + 1)
     none = np.zeros((0, 3, 3))
@@ -85,7 +82,7 @@ def _shells(triangles: Array, parts: Parts) -> list[Shell]:
     return found
 
 
-def _add_open(found: list[Shell], triangles: Array, which: NDArray[np.int64]) -> bool:
+def _add_open(found: list[Shell], triangles: Floats, which: Integers) -> bool:
     """Add open faces as a shell if they have an inside; return whether they have."""
     own = triangles[which]
     closing = caps(own)

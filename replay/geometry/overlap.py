@@ -7,18 +7,16 @@ times their sum is given in favour of meeting. It also covers axes and poses tha
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import inlined_kernel, leaf_kernel
+from replay.numerics.triples import Triple
 
-Array = NDArray[np.float64]
-
-_SLACK = 64.0 * float(np.finfo(np.float64).eps)
+_SLACK = 64.0 * EPSILON
 
 
 @leaf_kernel
-def spheres_meet(center_a: Array, radius_a: float, center_b: Array, radius_b: float, T_a_b: Array) -> bool:
+def spheres_meet(center_a: Floats, radius_a: float, center_b: Floats, radius_b: float, T_a_b: Floats) -> bool:
     """Return whether two spheres meet: |c_b - c_a|^2 <= (r_a + r_b)^2, centres (3,) and radii in [m]."""
     square, size = 0.0, radius_a + radius_b
     for i in range(3):
@@ -32,7 +30,7 @@ def spheres_meet(center_a: Array, radius_a: float, center_b: Array, radius_b: fl
 
 
 @leaf_kernel
-def aabbs_meet(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T_a_b: Array) -> bool:
+def aabbs_meet(center_a: Floats, half_a: Floats, center_b: Floats, half_b: Floats, T_a_b: Floats) -> bool:
     """Return whether box a and the box around b along a's axes meet, on each axis |c_b - c_a| <= w_a + |R| w_b."""
     slack = _sizes(center_a, half_a, center_b, half_b, T_a_b)
     for i in range(3):
@@ -48,7 +46,7 @@ def aabbs_meet(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T
 
 @leaf_kernel
 def obbs_meet(
-    center_a: Array, half_a: Array, axes_a: Array, center_b: Array, half_b: Array, axes_b: Array, T_a_b: Array
+    center_a: Floats, half_a: Floats, axes_a: Floats, center_b: Floats, half_b: Floats, axes_b: Floats, T_a_b: Floats
 ) -> bool:
     """Return whether two oriented boxes meet: no separating axis among the 15 (Gottschalk, Lin, Manocha 1996).
 
@@ -95,11 +93,8 @@ def obbs_meet(
     return not _edges_apart(t, r2, s2, s0, s1, half_a, half_b[0], half_b[1], slack)
 
 
-Vector = tuple[float, float, float]
-
-
 @inlined_kernel
-def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Array, half_b: float) -> bool:
+def _face_apart(t: Triple, r: Triple, s: Triple, half_a: Floats, half_b: float) -> bool:
     reach = half_b + half_a[0] * s[0] + half_a[1] * s[1] + half_a[2] * s[2]
     distance: float = abs(t[0] * r[0] + t[1] * r[1] + t[2] * r[2])
     apart: bool = distance > reach
@@ -108,7 +103,15 @@ def _face_apart(t: Vector, r: Vector, s: Vector, half_a: Array, half_b: float) -
 
 @inlined_kernel
 def _edges_apart(
-    t: Vector, r: Vector, s: Vector, s_m: Vector, s_n: Vector, half_a: Array, half_m: float, half_n: float, slack: float
+    t: Triple,
+    r: Triple,
+    s: Triple,
+    s_m: Triple,
+    s_n: Triple,
+    half_a: Floats,
+    half_m: float,
+    half_n: float,
+    slack: float,
 ) -> bool:
     """Test the three axes a_i x b_j of one edge direction b_j; r = (a_i . b_j), s = |r|, s_m and s_n of the others."""
     for i in range(3):
@@ -120,7 +123,7 @@ def _edges_apart(
 
 
 @inlined_kernel
-def _turned(axes: Array, v: Vector) -> Vector:
+def _turned(axes: Floats, v: Triple) -> Triple:
     return (
         axes[0, 0] * v[0] + axes[0, 1] * v[1] + axes[0, 2] * v[2],
         axes[1, 0] * v[0] + axes[1, 1] * v[1] + axes[1, 2] * v[2],
@@ -129,7 +132,7 @@ def _turned(axes: Array, v: Vector) -> Vector:
 
 
 @inlined_kernel
-def _column(axes_a: Array, axis_b: Array, T_a_b: Array) -> Vector:
+def _column(axes_a: Floats, axis_b: Floats, T_a_b: Floats) -> Triple:
     """Return (a_i . b) for one axis b of box b."""
     turned = (
         T_a_b[0, 0] * axis_b[0] + T_a_b[0, 1] * axis_b[1] + T_a_b[0, 2] * axis_b[2],
@@ -140,7 +143,7 @@ def _column(axes_a: Array, axis_b: Array, T_a_b: Array) -> Vector:
 
 
 @inlined_kernel
-def _sizes(center_a: Array, half_a: Array, center_b: Array, half_b: Array, T_a_b: Array) -> float:
+def _sizes(center_a: Floats, half_a: Floats, center_b: Floats, half_b: Floats, T_a_b: Floats) -> float:
     """Return the slack [m]: _SLACK times all lengths that enter."""
     total = 0.0
     for i in range(3):

@@ -13,12 +13,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.geometry.winding import Indices, Sides, components, sides
+from replay.geometry.winding import Sides, components, sides
+from replay.numerics.arrays import Flags, Floats, Integers
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Link = tuple[int, int, bool]
 
 _NO_WEDGE = 1e-9  # [rad]
@@ -35,13 +33,13 @@ class Parts(NamedTuple):
         one_sided: (parts,) whether no winding fits.
     """
 
-    label: Indices
+    label: Integers
     turned: Flags
     closed: Flags
     one_sided: Flags
 
 
-def find_parts(points: Array, faces: Indices) -> Parts:
+def find_parts(points: Floats, faces: Integers) -> Parts:
     """Return the parts of faces (n, 3), indices of points (p, 3). One-sided parts are left as they are wound."""
     found = sides(faces)
     at = found.first[:-1][found.number == 2]
@@ -61,7 +59,7 @@ def find_parts(points: Array, faces: Indices) -> Parts:
 class _Joined:
     """Which part each face belongs to, as far as it is known, while parts are joined."""
 
-    def __init__(self, label: Indices) -> None:
+    def __init__(self, label: Integers) -> None:
         self._label = label
         self._joined_to: dict[int, int] = {}
 
@@ -77,7 +75,7 @@ class _Joined:
             self._joined_to[second] = first
 
 
-def _against(label: Indices, pairs: Indices) -> tuple[Flags, Flags]:
+def _against(label: Integers, pairs: Integers) -> tuple[Flags, Flags]:
     """Return which faces to turn over so that neighbours agree, the smaller number of each part; which are one-sided.
 
     Each face stands twice, as it is and turned over, and is joined to its neighbours as they agree with it. The copies
@@ -97,7 +95,7 @@ def _against(label: Indices, pairs: Indices) -> tuple[Flags, Flags]:
     return turned ^ most[label], one_sided
 
 
-def _pair_up(points: Array, faces: Indices, found: Sides, edge: int, joined: _Joined) -> list[Link]:
+def _pair_up(points: Floats, faces: Integers, found: Sides, edge: int, joined: _Joined) -> list[Link]:
     """Return the neighbours across an edge of more than two faces, and join their parts."""
     at = range(found.first[edge], found.first[edge + 1])
     if len(at) > _MOST_AT_EDGE:
@@ -135,7 +133,7 @@ def _link(found: Sides, a: int, b: int) -> Link:
     return int(found.face[a]), int(found.face[b]), bool(found.forward[a] == found.forward[b])
 
 
-def _angles(points: Array, faces: Indices, found: Sides, edge: int, which: list[int]) -> list[float]:
+def _angles(points: Floats, faces: Integers, found: Sides, edge: int, which: list[int]) -> list[float]:
     """Return how far the faces are turned about an edge [rad], from any direction."""
     low, high = found.ends[edge]
     start, way = points[low], points[high] - points[low]
@@ -150,7 +148,7 @@ def _angles(points: Array, faces: Indices, found: Sides, edge: int, which: list[
     return angles
 
 
-def _closed(faces: Indices, label: Indices, turned: Flags) -> Flags:
+def _closed(faces: Integers, label: Integers, turned: Flags) -> Flags:
     """Return which parts are closed: walked equally often both ways along each edge, within the part."""
     found = sides(np.where(turned[:, None], faces[:, [0, 2, 1]], faces))
     of_part = label[found.face]

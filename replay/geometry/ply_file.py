@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
-from replay.geometry.ply_numbers import Binary, Columns, Element, Lists, Property, Text, columns_of
+from replay.geometry.ply_numbers import BinaryNumbers, Columns, Element, Lists, Property, TextNumbers, columns_of
 from replay.geometry.polygons import triangulate
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from replay.numerics.arrays import Floats, Integers
 
 _TYPES: Final = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -32,7 +29,7 @@ _LONGEST_HEADER = 1 << 16
 _LONGEST_COUNT = 18  # digits
 
 
-def read(data: bytes) -> tuple[Floats, Indices]:
+def read(data: bytes) -> tuple[Floats, Integers]:
     """Return the vertices (v, 3) and the triangles (f, 3) of a PLY file; polygons are split, see `polygons`.
 
     Raises:
@@ -45,7 +42,7 @@ def read(data: bytes) -> tuple[Floats, Indices]:
     announced = ", ".join(f"{element.name} {element.count}" for element in elements)
     old_mac = body.startswith(b"\r") and not body.startswith(b"\r\n")  # whose lines end so
     body = body[1:] if old_mac else body.partition(b"\n")[2]
-    source: Text | Binary = Binary(body, announced)
+    source: TextNumbers | BinaryNumbers = BinaryNumbers(body, announced)
     if order:
         least = sum(element.count * element.least for element in elements)
         if len(body) < least:
@@ -61,7 +58,7 @@ def read(data: bytes) -> tuple[Floats, Indices]:
             rule = f"its header announces {element.name[:60]} {element.count}"
             raise ValueError(f"{rule}; at most {limits.TRIANGLES} of an element are read")
     if not order:
-        source = Text(body, announced)
+        source = TextNumbers(body, announced)
     columns = [(element, columns_of(element, source)) for element in elements]
     points, triangles = np.zeros((0, 3)), [np.zeros((0, 3), np.int64)]
     for element, found in columns:
@@ -107,13 +104,13 @@ def _corners(element: Element, found: Columns) -> Lists:
     return lists[0]
 
 
-def _polygons(points: Floats, corners: Lists) -> Indices:
+def _polygons(points: Floats, corners: Lists) -> Integers:
     if corners.lengths.min() < 3:
         raise ValueError(f"face {int(np.argmax(corners.lengths < 3)) + 1} has fewer than three corners")
     return triangulate(points, corners.values.astype(np.int64), corners.lengths)
 
 
-def _strips(_points: Floats, corners: Lists) -> Indices:
+def _strips(_points: Floats, corners: Lists) -> Integers:
     """Return the triangles of strips, every second one turned; -1 ends a strip within a list."""
     found = [np.zeros((0, 3), np.int64)]
     for strip in np.split(corners.values.astype(np.int64), np.cumsum(corners.lengths)[:-1]):
@@ -124,5 +121,5 @@ def _strips(_points: Floats, corners: Lists) -> Indices:
             found.append(triangles)
     result = np.concatenate(found)
     a, b, c = result.T
-    kept: Indices = result[(a != b) & (b != c) & (c != a)]  # a corner given twice turns the strip, no more
+    kept: Integers = result[(a != b) & (b != c) & (c != a)]  # a corner given twice turns the strip, no more
     return kept

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Column = NDArray[Any]
+from replay.numerics.arrays import Column, Integers
+
 Kind = np.dtype[Any]
 
 
@@ -43,7 +43,7 @@ class Lists(NamedTuple):
     """A list in each of n rows: all values one after the other, and how many each row has (n,)."""
 
     values: Column
-    lengths: NDArray[np.int64]
+    lengths: Integers
 
 
 _MOST = 1 << 31
@@ -68,7 +68,7 @@ class Source(Protocol):
         """Return the next numbers, (count,), all of one kind; ValueError when there are fewer."""
 
 
-class Text:
+class TextNumbers:
     """Numbers written as words."""
 
     def __init__(self, body: bytes, announced: str) -> None:
@@ -107,7 +107,7 @@ def _parts(text: bytes) -> Iterator[bytes]:
         begin = end.start() + 1 if end else len(text) + 1
 
 
-class Binary:
+class BinaryNumbers:
     """Numbers as bytes."""
 
     def __init__(self, body: bytes, announced: str) -> None:

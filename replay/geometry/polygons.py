@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.rows import distinct_rows
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _FOLD = 1e-6  # of a polygon's area: a triangle that turns back by less is the rounding of a straight edge
 
 
-def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Sequence[int] | Indices) -> Indices:
+def triangulate(points: Floats, corners: Sequence[int] | Integers, lengths: Sequence[int] | Integers) -> Integers:
     """Return the triangles (f, 3) of polygons, in order.
 
     Args:
@@ -36,7 +33,7 @@ def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Seque
     start = np.cumsum(lengths) - lengths
     first = np.repeat(start, sizes)
     step = np.arange(len(first)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    fans: Indices = corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    fans: Integers = corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
     if len(fans) == len(lengths) or fans.min() < 0 or fans.max() >= len(points):
         return fans  # triangles alone, or corners that are none, for who checks them
     folded = np.flatnonzero(_folded(points[fans], sizes))
@@ -56,7 +53,7 @@ def triangulate(points: Floats, corners: Sequence[int] | Indices, lengths: Seque
     return np.concatenate(several)
 
 
-def _again(places: Indices, start: Indices, lengths: Indices) -> list[tuple[int, int]]:
+def _again(places: Integers, start: Integers, lengths: Integers) -> list[tuple[int, int]]:
     """Return which polygons of more than three corners have those of an earlier one, in either sense, and which one."""
     mark = np.random.default_rng(1).integers(2**62, size=int(places.max(initial=0)) + 1, dtype=np.uint64)
     total = np.add.reduceat(mark[places], start)  # equal where the corners are
@@ -72,7 +69,7 @@ def _again(places: Indices, start: Indices, lengths: Indices) -> list[tuple[int,
     return found
 
 
-def _split_alike(polygon: Indices, triangles: Indices, place: Indices) -> Indices:
+def _split_alike(polygon: Integers, triangles: Integers, place: Integers) -> Integers:
     """Return a polygon's triangles with the diagonals of those of an earlier one, in its own sense.
 
     A face that is there twice, once from each side, would else be four triangles that differ.
@@ -84,7 +81,7 @@ def _split_alike(polygon: Indices, triangles: Indices, place: Indices) -> Indice
     return found if forward else found[:, ::-1]
 
 
-def _folded(triangles: Floats, sizes: Indices) -> NDArray[np.bool_]:
+def _folded(triangles: Floats, sizes: Integers) -> Flags:
     """Return which polygons (n,) a fan covers wrongly: of it a triangle turns back over the others.
 
     Args:
@@ -99,7 +96,7 @@ def _folded(triangles: Floats, sizes: Indices) -> NDArray[np.bool_]:
     return np.asarray(np.logical_or.reduceat(back, first))
 
 
-def _ears(polygon: Floats) -> Indices:
+def _ears(polygon: Floats) -> Integers:
     """Return the triangles (f, 3), indices of a polygon (n, 3), seen along the normal that its area has."""
     import mapbox_earcut
 
@@ -119,7 +116,7 @@ def _ears(polygon: Floats) -> Indices:
     return _with_all_corners(triangles if turn >= 0.0 else triangles[:, ::-1], len(polygon))
 
 
-def _with_all_corners(triangles: Indices, count: int) -> Indices:
+def _with_all_corners(triangles: Integers, count: int) -> Integers:
     """Return triangles with more beside them where they leave corners out, most of them on a straight edge.
 
     Without those corners the edge would not be that of the neighbouring polygons.

@@ -10,19 +10,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
+from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import FULL_TURN
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 FEWEST_SEGMENTS = 8
 """Segments of a full circle, however coarse the chord error asked for."""
 
 _MOST_TRIANGLES = 2_000_000
-_FULL_TURN = 2.0 * math.pi
 
 
 def cuboid(size: Sequence[float]) -> Solid:
@@ -112,9 +110,9 @@ def arc(radius: float, span: float, width: float, thickness: float, chord_error:
         _positive(name, value)
     if thickness >= 2.0 * radius:
         raise InvalidValue("thickness", thickness, f"must be below twice the radius, {2.0 * radius} m")
-    if span > _FULL_TURN * (1.0 + 1e-12):
+    if span > FULL_TURN * (1.0 + 1e-12):
         raise InvalidValue("span", span, "must be at most 2 pi rad")
-    full = span >= _FULL_TURN * (1.0 - 1e-12)
+    full = span >= FULL_TURN * (1.0 - 1e-12)
     outer = radius + 0.5 * thickness
     inner = radius - 0.5 * thickness
     count = _segments(outer, span, chord_error)
@@ -148,23 +146,23 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
     """Return the fewest equal segments of an arc whose sagitta is at most chord_error."""
     _positive("chord_error", chord_error)
     half_angle = 2.0 * math.asin(math.sqrt(min(0.5 * chord_error / radius, 0.5)))
-    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / _FULL_TURN - 1e-9))
+    fewest = max(1, math.ceil(FEWEST_SEGMENTS * span / FULL_TURN - 1e-9))
     needed = 0.5 * span / half_angle
     _check_count("chord_error", chord_error, 8.0 * needed)
     count = max(fewest, math.ceil(needed))
     return count if _sagitta(radius, 0.5 * span / count) <= chord_error else count + 1
 
 
-def _circle(radius: float, chord_error: float) -> tuple[Array, float]:
+def _circle(radius: float, chord_error: float) -> tuple[Floats, float]:
     """Return the corners (n, 2) of the polygon, counter-clockwise, and its sagitta."""
     _positive("radius", radius)
-    count = _segments(radius, _FULL_TURN, chord_error)
-    angles = [_FULL_TURN * k / count for k in range(count)]
+    count = _segments(radius, FULL_TURN, chord_error)
+    angles = [FULL_TURN * k / count for k in range(count)]
     rim = np.array([[radius * math.cos(angle), radius * math.sin(angle)] for angle in angles])
     return rim, _sagitta(radius, math.pi / count)
 
 
-def _icosahedron() -> Array:
+def _icosahedron() -> Floats:
     """Return the 20 faces (20, 3, 3) of the icosahedron with corners on the unit sphere, seen from outside."""
     golden = 0.5 * (1.0 + math.sqrt(5.0))
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
@@ -184,18 +182,18 @@ def _icosahedron() -> Array:
 _ICOSAHEDRON = _icosahedron()
 
 
-def _sphere_face(face: Array, splits: int) -> Array:
+def _sphere_face(face: Floats, splits: int) -> Floats:
     """Return one face of the icosahedron as splits^2 triangles (n, 3, 3) with corners on the unit sphere.
 
     A point is i A + j B + k C, i + j + k = splits, pushed out. On an edge one term is zero, so both faces round alike
     and the seams close exactly.
     """
 
-    def corner(i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    def corner(i: Integers, j: Integers) -> Floats:
         k = splits - i - j
         raw = i[:, None] * face[0] + j[:, None] * face[1] + k[:, None] * face[2]
-        length: Array = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
-        pushed: Array = raw / length[:, None]
+        length: Floats = np.sqrt(raw[:, 0] ** 2 + raw[:, 1] ** 2 + raw[:, 2] ** 2)
+        pushed: Floats = raw / length[:, None]
         return pushed
 
     i, j = (index.ravel() for index in np.meshgrid(np.arange(splits), np.arange(splits), indexing="ij"))
@@ -206,19 +204,19 @@ def _sphere_face(face: Array, splits: int) -> Array:
     return np.concatenate([upward, downward])
 
 
-def _deepest(triangles: Array) -> float:
+def _deepest(triangles: Floats) -> float:
     """Return the largest depth of triangles inscribed in the unit sphere below it."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
     return float(np.max(1.0 - np.sum(normal * a, axis=1) / np.sqrt(np.sum(normal * normal, axis=1))))
 
 
-def _quads(corners: Array) -> Array:
+def _quads(corners: Floats) -> Floats:
     """Return quadrilaterals (n, 4, 3) as triangles (2 n, 3, 3)."""
     return np.ascontiguousarray(corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3))
 
 
-def _distinct(triangles: Array) -> Array:
+def _distinct(triangles: Floats) -> Floats:
     return distinct_rows(triangles.reshape(-1, 3) + 0.0).rows
 
 

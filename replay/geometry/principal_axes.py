@@ -12,18 +12,16 @@ import math
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Array = NDArray[np.float64]
 
 _SWEEPS = 30  # a 3x3 matrix needs about 5
 
 
 @entry(float64[:, ::1])
 @kernel
-def covariance_of_points(points: Array) -> Array:
+def covariance_of_points(points: Floats) -> Floats:
     """Return the covariance (3, 3) [m^2] of points (n, 3) about their mean."""
     n = len(points)
     mean = np.zeros(3)
@@ -40,7 +38,7 @@ def covariance_of_points(points: Array) -> Array:
 
 @entry(float64[:, :, ::1])
 @kernel
-def covariance_of_triangles(triangles: Array) -> tuple[float, Array]:
+def covariance_of_triangles(triangles: Floats) -> tuple[float, Floats]:
     """Return (area [m^2], covariance (3, 3) [m^2]) of the surface triangles (n, 3, 3); zeros for no area."""
     n = len(triangles)
     areas, centroids = np.empty(n), np.empty((n, 3))
@@ -74,7 +72,7 @@ def covariance_of_triangles(triangles: Array) -> tuple[float, Array]:
 
 @entry(float64[:, ::1])
 @kernel
-def eigen(matrix: Array) -> tuple[Array, Array]:
+def eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Return (values (3,) ascending, vectors (3, 3) in rows) of a symmetric matrix, by Jacobi's rotations.
 
     The vectors are a product of rotations, so they are orthonormal whether or not values repeat.

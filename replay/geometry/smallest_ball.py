@@ -11,27 +11,25 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Array = NDArray[np.float64]
 
 _MOST_PIVOTS = 1000  # about 10 are needed; rounding cannot make it run longer than this
 
 
 @entry(float64[:, ::1])
 @kernel
-def smallest_ball_centre(points: Array) -> Array:
+def smallest_ball_centre(points: Floats) -> Floats:
     """Return the centre (3,) of the smallest ball around points (n, 3), n >= 1, of extent about 1 about the origin."""
     support = np.empty((5, 3))
     chosen = np.empty((4, 3))
     trial = np.empty((4, 3))
     candidate, best_candidate = np.empty(3), np.empty(3)
-    centre: Array = points[0].copy()
+    centre: Floats = points[0].copy()
     support[0] = points[0]
     count = 1
-    result: Array = points[0].copy()
+    result: Floats = points[0].copy()
     reached, grown = np.inf, -1.0
     for _ in range(_MOST_PIVOTS):
         furthest, square = 0, -1.0
@@ -74,13 +72,13 @@ def smallest_ball_centre(points: Array) -> Array:
 
 
 @kernel
-def _squared(a: Array, b: Array) -> float:
+def _squared(a: Floats, b: Floats) -> float:
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return x * x + y * y + z * z  # type: ignore[no-any-return]
 
 
 @kernel
-def _circumcentre(points: Array, count: int, centre: Array) -> bool:
+def _circumcentre(points: Floats, count: int, centre: Floats) -> bool:
     """Write the centre of the smallest sphere through 1 to 4 points; False when they do not determine one.
 
     With a, b, c the other points seen from the first: a / 2; (|a|^2 b x n + |b|^2 n x a) / (2 n.n), n = a x b;

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +26,10 @@ class Solid:
         notes: what a reader of the scenario should know about an imported mesh, one sentence each.
     """
 
-    triangles: Array
-    pieces: tuple[Array, ...] = ()
+    triangles: Floats
+    pieces: tuple[Floats, ...] = ()
     watertight: bool = True
-    closing: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    closing: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
     chord_error: float = 0.0
     dropped: int = 0
     notes: tuple[str, ...] = field(default=())
@@ -47,12 +45,12 @@ class Solid:
         return self.watertight or len(self.closing) > 0
 
     @property
-    def closing_of_inside(self) -> Array | None:
+    def closing_of_inside(self) -> Floats | None:
         """The caps of a body that has an inside, none if it is watertight; None where it has no inside."""
         return self.closing if self.has_inside else None
 
     @property
-    def vertices(self) -> Array:
+    def vertices(self) -> Floats:
         """The distinct corners (v, 3) [m], sorted by coordinates."""
         return distinct_rows(self.triangles.reshape(-1, 3) + 0.0).rows  # + 0.0 makes -0.0 and 0.0 one
 
@@ -61,7 +59,7 @@ class Solid:
         """The enclosed volume [m^3], meaningful when watertight; see `signed_volume`."""
         return signed_volume(self.triangles)
 
-    def transformed(self, T: Array) -> Solid:
+    def transformed(self, T: Floats) -> Solid:
         """Return the solid moved by the rigid transform T (4, 4)."""
         T = np.asarray(T, dtype=np.float64)
         pieces = tuple(transforms.apply(T, piece) for piece in self.pieces)
@@ -69,7 +67,7 @@ class Solid:
         return replace(self, triangles=triangles, closing=closing, pieces=pieces)
 
 
-def signed_volume(triangles: Array) -> float:
+def signed_volume(triangles: Floats) -> float:
     """Return the volume [m^3] that closed triangles (n, 3, 3) [m] enclose, negative when they are inside out.
 
     The sum of the tetrahedra under the triangles, from a corner of their own: a far origin would cancel digits.

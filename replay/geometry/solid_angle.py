@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel
-def winding_number(point: Array, triangles: Array) -> float:
+def winding_number(point: Floats, triangles: Floats) -> float:
     """Return how often the surface triangles (n, 3, 3) winds about the point: the sum of solid angles / 4 pi."""
     total = 0.0
     x, y, z = point[0], point[1], point[2]

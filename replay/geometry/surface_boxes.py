@@ -17,15 +17,11 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.principal_axes import eigen
 from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.arrays import Floats, Integers, Singles
 from replay.numerics.jit import entry, kernel
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Ints = NDArray[np.int64]
 
 CENTRE, AXES, HALVES, BOX = 0, 3, 12, 15
 """Where the numbers of a box begin, and how many they are: centre, three axes, three half widths."""
@@ -129,7 +125,7 @@ def _measure(triangles: Floats, origin: Floats, axes: Floats, low: Floats, high:
 
 @entry(TREE_TYPE, float64[:, :, ::1], int64[::1], float64[::1])
 @kernel
-def fit_boxes(tree: Tree, triangles: Floats, nodes: Ints, middle: Floats) -> Singles:
+def fit_boxes(tree: Tree, triangles: Floats, nodes: Integers, middle: Floats) -> Singles:
     """Return the boxes (k, BOX) [m] of k nodes of a binary tree, their centres seen from `middle`.
 
     Args:

@@ -13,13 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, record
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _BINS = 16
 _FREE_LEVELS = 32
@@ -41,10 +38,10 @@ class Tree(NamedTuple):
 
     lower: Floats  # (m, 3) [m]
     upper: Floats  # (m, 3) [m]
-    second: Ints  # (m,)
-    begin: Ints  # (m,)
-    end: Ints  # (m,)
-    order: Ints  # (n,)
+    second: Integers  # (m,)
+    begin: Integers  # (m,)
+    end: Integers  # (m,)
+    order: Integers  # (n,)
 
 
 TREE_TYPE = record(Tree, float64[:, ::1], float64[:, ::1], int64[::1], int64[::1], int64[::1], int64[::1])
@@ -120,13 +117,13 @@ def _best_plane(
     lower: Floats,
     upper: Floats,
     centres: Floats,
-    order: Ints,
+    order: Integers,
     begin: int,
     end: int,
     box: Floats,
     bins: Floats,
     sweep: Floats,
-    counts: Ints,
+    counts: Integers,
     behind: Floats,
 ) -> tuple[int, int]:
     """Return (axis, plane): parts whose centre's bin is at most `plane` go first; axis -1 when no plane divides them.
@@ -170,7 +167,15 @@ def _best_plane(
 
 @kernel
 def _partition(
-    centres: Floats, order: Ints, begin: int, end: int, axis: int, plane: int, low: float, scale: float, spare: Ints
+    centres: Floats,
+    order: Integers,
+    begin: int,
+    end: int,
+    axis: int,
+    plane: int,
+    low: float,
+    scale: float,
+    spare: Integers,
 ) -> int:
     """Put the parts up to the plane first, keeping their order, and return where the others begin."""
     middle, others = begin, 0
@@ -194,10 +199,10 @@ def _build(
     upper: Floats,
     centres: Floats,
     leaf_size: int,
-    order: Ints,
-    spare: Ints,
+    order: Integers,
+    spare: Integers,
     node_boxes: Floats,
-    nodes: Ints,
+    nodes: Integers,
 ) -> int:
     """Write the nodes' boxes (lower, upper) and (second, begin, end), sort `order`, and return the number of nodes."""
     bins, sweep, counts, behind = np.empty((_BINS, 6)), np.empty(6), np.empty(_BINS, np.int64), np.empty(_BINS)

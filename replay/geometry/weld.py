@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.copies import copies
 from replay.geometry.facets import alike
-from replay.geometry.winding import Indices, components, sides
-
-Array = NDArray[np.float64]
+from replay.geometry.winding import components, sides
+from replay.numerics.arrays import Flags, Floats, Integers
 
 TOLERANCES: Final = (1e-12, 1e-9, 1e-6)
 """How far apart corners that are taken for one may be, as shares of the body's largest extent, tried in this order.
@@ -23,7 +21,7 @@ _CROWD = 50  # of neighbours a corner has on average: so many are a shape of its
 _ROUNDING = TOLERANCES[0]
 
 
-def weld(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indices:
+def weld(points: Floats, faces: Integers, flat: Flags) -> Integers:
     """Return the corner that each corner (p,) is taken for, itself for most.
 
     Only corners at the ends of open edges are looked at, and they become one only where that closes an edge. No
@@ -55,14 +53,14 @@ def weld(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indices:
 
 
 def _welded(
-    points: Array,
-    faces: Indices,
-    flat: NDArray[np.bool_],
-    taken_for: Indices,
-    pairs: Indices,
+    points: Floats,
+    faces: Integers,
+    flat: Flags,
+    taken_for: Integers,
+    pairs: Integers,
     reach: float,
     tolerance: float,
-) -> Indices:
+) -> Integers:
     """Return `taken_for` with those groups of near corners that may become one and close an edge by it."""
     now = taken_for[faces]
     group = components(len(points), pairs)
@@ -86,7 +84,7 @@ def _welded(
         allowed &= useful
 
 
-def weld_copies(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indices:
+def weld_copies(points: Floats, faces: Integers, flat: Flags) -> Integers:
     """Return the corner that each corner (p,) is taken for, itself for most: triangles are seen to be copies then.
 
     Corners become one if the rounding of doubles has parted them, no triangle that has an area loses it, and there are
@@ -105,11 +103,11 @@ def weld_copies(points: Array, faces: Indices, flat: NDArray[np.bool_]) -> Indic
     return trial if _copies(points, trial[faces]) > _copies(points, faces) else itself
 
 
-def _copies(points: Array, faces: Indices) -> int:
+def _copies(points: Floats, faces: Integers) -> int:
     return int(np.count_nonzero(copies(alike(points, faces).faces)))
 
 
-def _small(points: Array, group: Indices, reach: float, faces: Indices) -> NDArray[np.bool_]:
+def _small(points: Floats, group: Integers, reach: float, faces: Integers) -> Flags:
     """Return which groups of several corners are no larger than `reach`, and hold no two of one face."""
     size = np.bincount(group)
     low, high = np.full((len(size), 3), np.inf), np.full((len(size), 3), -np.inf)
@@ -122,7 +120,7 @@ def _small(points: Array, group: Indices, reach: float, faces: Indices) -> NDArr
     return np.asarray(allowed)
 
 
-def _merged(group: Indices, allowed: NDArray[np.bool_], used: Indices) -> Indices:
+def _merged(group: Integers, allowed: Flags, used: Integers) -> Integers:
     """Return the corner that each one is taken for when the allowed groups are one: the one used most, the first."""
     order = np.lexsort([np.arange(len(group)), -used, group])
     heads = np.empty(len(allowed), dtype=np.int64)
@@ -131,10 +129,10 @@ def _merged(group: Indices, allowed: NDArray[np.bool_], used: Indices) -> Indice
     return np.where(allowed[group], heads[group], np.arange(len(group)))
 
 
-def _made_alike(now: Indices, then: Indices) -> NDArray[np.bool_]:
+def _made_alike(now: Integers, then: Integers) -> Flags:
     """Return which faces (n,) have the corners of another one then, but not now."""
 
-    def kinds(faces: Indices) -> Indices:
+    def kinds(faces: Integers) -> Integers:
         return np.asarray(np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)[1]).ravel()
 
     before, after = kinds(now), kinds(then)
@@ -143,7 +141,7 @@ def _made_alike(now: Indices, then: Indices) -> NDArray[np.bool_]:
     return np.asarray(several[after])
 
 
-def _ends_of_closed_edges(now: Indices, then: Indices) -> Indices:
+def _ends_of_closed_edges(now: Integers, then: Integers) -> Integers:
     """Return the corners, as they are now, at the ends of open edges that are not open then."""
     before = sides(now)
     odd = before.ends[before.number % 2 == 1]

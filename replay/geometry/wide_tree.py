@@ -12,16 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float32, float64, int32, int64
-from numpy.typing import NDArray
 
 from replay.geometry.surface_boxes import BOX, HALVES, fit_boxes
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.arrays import Floats, Integers, ShortIntegers, Singles
 from replay.numerics.jit import entry, kernel, record
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Ints = NDArray[np.int64]
-ShortInts = NDArray[np.int32]
 
 LANES = 8
 """Children of a node, and most triangles of a leaf."""
@@ -39,9 +34,9 @@ class WideTree(NamedTuple):
     """
 
     boxes: Singles  # (r, BOX * LANES) [m], centres seen from `middle`, see `surface_boxes`
-    children: ShortInts  # (r, LANES), node 0 is the root
+    children: ShortIntegers  # (r, LANES), node 0 is the root
     corners: Floats  # (l, 9 * LANES) [m]
-    indices: ShortInts  # (l, LANES) of the triangles
+    indices: ShortIntegers  # (l, LANES) of the triangles
     middle: Floats  # (3,) of the body's box [m]
     farthest: Floats  # (3,) largest absolute coordinates of the body [m]
 
@@ -79,7 +74,7 @@ def widen(tree: Tree, triangles: Floats) -> WideTree:
 
 @entry(TREE_TYPE)
 @kernel
-def _collapse(tree: Tree) -> tuple[Ints, ShortInts, Ints]:
+def _collapse(tree: Tree) -> tuple[Integers, ShortIntegers, Integers]:
     """Return members (r, LANES) of the nodes as nodes of the binary tree or -1, children, and leaves (l,) likewise."""
     most = len(tree.second)
     members, children = np.full((most, LANES), -1, np.int64), np.zeros((most, LANES), np.int32)
@@ -119,7 +114,7 @@ def _collapse(tree: Tree) -> tuple[Ints, ShortInts, Ints]:
 
 @entry(TREE_TYPE, float64[:, :, ::1], int64[::1])
 @kernel
-def _pack(tree: Tree, triangles: Floats, leaves: Ints) -> tuple[Floats, ShortInts]:
+def _pack(tree: Tree, triangles: Floats, leaves: Integers) -> tuple[Floats, ShortIntegers]:
     """Return the corners and indices of the leaves; triangles in the order of the tree."""
     corners, indices = np.empty((len(leaves), 9 * LANES)), np.full((len(leaves), LANES), -1, np.int32)
     for leaf in range(len(leaves)):

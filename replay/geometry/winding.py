@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.rows import distinct_rows
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 class Sides(NamedTuple):
@@ -24,23 +20,23 @@ class Sides(NamedTuple):
         ends: (e, 2) the lower and the higher corner of each edge.
     """
 
-    face: Indices
+    face: Integers
     forward: Flags
-    first: Indices
-    ends: Indices
+    first: Integers
+    ends: Integers
 
     @property
-    def number(self) -> Indices:
+    def number(self) -> Integers:
         """How many sides lie on each edge (e,)."""
         return np.diff(self.first)
 
     @property
-    def edge(self) -> Indices:
+    def edge(self) -> Integers:
         """The edge of each side (s,)."""
         return np.repeat(np.arange(len(self.ends)), self.number)
 
     @property
-    def balance(self) -> Indices:
+    def balance(self) -> Integers:
         """How much oftener each edge (e,) is walked forward than back; all 0: the surface is closed."""
         steps = np.concatenate([[0], np.cumsum(np.where(self.forward, 1, -1))])
         return np.asarray(np.diff(steps[self.first]), dtype=np.int64)
@@ -65,7 +61,7 @@ class Topology(NamedTuple):
         return self.open_edges == 0 and self.crowded_edges == 0 and self.reversed_edges == 0
 
 
-def corner_indices(triangles: Array) -> tuple[Array, Indices]:
+def corner_indices(triangles: Floats) -> tuple[Floats, Integers]:
     """Return the corners of triangles (n, 3, 3) as points (p, 3) and indices (n, 3) of them.
 
     Corners are one where they are exactly equal.
@@ -74,7 +70,7 @@ def corner_indices(triangles: Array) -> tuple[Array, Indices]:
     return corners.rows, corners.kind.reshape(-1, 3).astype(np.int64)
 
 
-def sides(faces: Indices) -> Sides:
+def sides(faces: Integers) -> Sides:
     """Return the sides of faces (n, 3), corner indices."""
     face = np.repeat(np.arange(len(faces)), 3)
     start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
@@ -89,7 +85,7 @@ def sides(faces: Indices) -> Sides:
     return Sides(face[order], (start < end)[order], np.append(first, len(key)), ends)
 
 
-def topology(faces: Indices) -> Topology:
+def topology(faces: Integers) -> Topology:
     """Return the topology of a surface of faces (n, 3), corner indices."""
     found = sides(faces)
     count = found.number
@@ -98,7 +94,7 @@ def topology(faces: Indices) -> Topology:
     return Topology(*(int(np.count_nonzero(kind)) for kind in (count == 1, odd & (count > 1), turned)))
 
 
-def components(count: int, pairs: Indices) -> Indices:
+def components(count: int, pairs: Integers) -> Integers:
     """Return which component (count,) each of `count` things is in, where pairs (k, 2) are joined."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

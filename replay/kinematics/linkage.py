@@ -7,14 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 
-Array = NDArray[np.float64]
+WORLD = "world"
+"""Name of the frame that all links are placed in; no link has it."""
 
-POSE_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+POSE_ROUNDING = 8.0 * EPSILON
 """Rounding of the place of one link in another, as part of the way between them (`LinkPoses.way`).
 
 Chains of up to eight links, turned every way, were off by at most 1.1 epsilon of the sum of their steps.
@@ -70,7 +72,7 @@ class Link:
 
     name: str
     parent: str | None
-    T_parent_joint: Array
+    T_parent_joint: Floats
     joint: Joint
 
 
@@ -85,11 +87,11 @@ class LinkPoses:
     """
 
     linkage: Linkage
-    local: Array
-    world: Array
-    _chains: dict[tuple[int, ...], Array] = field(default_factory=dict, init=False, repr=False)
+    local: Floats
+    world: Floats
+    _chains: dict[tuple[int, ...], Floats] = field(default_factory=dict, init=False, repr=False)
 
-    def relative(self, a: int, b: int) -> Array:
+    def relative(self, a: int, b: int) -> Floats:
         """Return T_a_b (n, 4, 4), pose of link b in link a, formed through their nearest common ancestor.
 
         Two links of one tree never see the tree's place in the world, so a machine far from the origin reads the same.
@@ -99,7 +101,7 @@ class LinkPoses:
         T_ancestor_b = self._chain(up_b)
         return transforms.compose(transforms.invert(T_ancestor_a), T_ancestor_b)
 
-    def way(self, a: int, b: int) -> Array:
+    def way(self, a: int, b: int) -> Floats:
         """Return how long the way from link a to link b over their common ancestor is (n,) [m].
 
         Rounding of `relative(a, b)` is relative to it, even where the two links stand at the same place. A step counts
@@ -117,7 +119,7 @@ class LinkPoses:
         """Return the poses of frames begin..end-1."""
         return LinkPoses(self.linkage, self.local[begin:end], self.world[begin:end])
 
-    def _chain(self, links: Sequence[int]) -> Array:
+    def _chain(self, links: Sequence[int]) -> Floats:
         """Return the pose (n, 4, 4) of the first of some links, each the next one's child, in the last one's parent."""
         key = tuple(links)
         if key not in self._chains:  # many pairs of links share the way up of one
@@ -186,7 +188,7 @@ class Linkage:
         """Return whether links a and b are joined by a joint."""
         return bool(self.parents[a] == b or self.parents[b] == a)
 
-    def forward(self, positions: Array, free_poses: Array) -> LinkPoses:
+    def forward(self, positions: Floats, free_poses: Floats) -> LinkPoses:
         """Return the poses of all links.
 
         Args:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, MotionLimitError
 from replay.kinematics.linkage import Joint, Linkage
@@ -21,8 +20,7 @@ from replay.kinematics.profiles import (
     trapezoid_time,
 )
 from replay.numerics import transforms
-
-Array = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 LIMIT_SLACK = 1e-9  # relative: a move planned exactly at its limit may exceed it by rounding, never by more
 
@@ -63,8 +61,8 @@ class Track:
         tolerance: how far they may be beyond the joint's limits [rad or m]: what was measured has noise.
     """
 
-    seconds: Array
-    positions: Array
+    seconds: Floats
+    positions: Floats
     tolerance: float = 0.0
 
 
@@ -78,9 +76,9 @@ class FreeTrack:
         quat_xyzw: (n, 4), not zero.
     """
 
-    seconds: Array
-    xyz: Array
-    quat_xyzw: Array
+    seconds: Floats
+    xyz: Floats
+    quat_xyzw: Floats
 
 
 @dataclass(frozen=True)
@@ -109,9 +107,9 @@ class JointStates:
         free_poses: (n, K, 4, 4), T_joint_link of the free joints, in the order of `Linkage.free_names`.
     """
 
-    positions: Array
-    velocities: Array
-    free_poses: Array
+    positions: Floats
+    velocities: Floats
+    free_poses: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +124,7 @@ class Motion:
     profiles: tuple[Profile, ...]
     paths: tuple[FreePath | None, ...]
 
-    def states(self, seconds: Array) -> JointStates:
+    def states(self, seconds: Floats) -> JointStates:
         """Return the joint states at times (n,) [s]; those at one time do not depend on the others."""
         n = len(seconds)
         positions = np.empty((n, len(self.profiles)))
@@ -163,7 +161,7 @@ def plan(linkage: Linkage, script: Script) -> Motion:
     return Motion(tuple(profiles[joint.name] for joint in linkage.joints), tuple(map(paths.get, linkage.free_names)))
 
 
-def sample(linkage: Linkage, script: Script, seconds: Array) -> JointStates:
+def sample(linkage: Linkage, script: Script, seconds: Floats) -> JointStates:
     """Return the joint states at times (n,) [s]; see `plan`."""
     return plan(linkage, script).states(seconds)
 
@@ -264,9 +262,9 @@ def _planned(joints: Mapping[str, Joint], moves: tuple[Move, ...]) -> dict[str, 
 class FreePath:
     """The way of a free joint: m times [s], positions (m, 3) [m] and unit quaternions (m, 4)."""
 
-    times: Array
-    xyz: Array
-    quat_xyzw: Array
+    times: Floats
+    xyz: Floats
+    quat_xyzw: Floats
 
     @staticmethod
     def through(name: str, keyframes: tuple[Keyframe, ...]) -> FreePath:
@@ -284,7 +282,7 @@ class FreePath:
         quat = track.quat_xyzw
         return FreePath(track.seconds, track.xyz, quat / np.sqrt(np.sum(quat**2, axis=-1))[:, None])
 
-    def poses(self, seconds: Array) -> Array:
+    def poses(self, seconds: Floats) -> Floats:
         """Poses (n, 4, 4) between key frames: position on a straight line, rotation by slerp, the end values hold."""
         times, xyz = self.times, self.xyz
         begin = np.clip(np.searchsorted(times, seconds, side="right") - 1, 0, len(times) - 1)

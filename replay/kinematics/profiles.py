@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
-
-Array = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -51,13 +49,13 @@ class Profile:
         before, after: [rad or m], position before the first and after the last piece.
     """
 
-    start: Array
-    end: Array
-    coefficients: Array
+    start: Floats
+    end: Floats
+    coefficients: Floats
     before: float
     after: float
 
-    def sample(self, seconds: Array) -> tuple[Array, Array]:
+    def sample(self, seconds: Floats) -> tuple[Floats, Floats]:
         """Return position (n,) and velocity (n,) at times (n,) [s]."""
         if not len(self.start):
             return np.full(len(seconds), self.after), np.zeros(len(seconds))
@@ -124,7 +122,7 @@ def through_waypoints(name: str, waypoints: Sequence[Waypoint]) -> Profile:
     )
 
 
-def through_samples(seconds: Array, positions: Array) -> Profile:
+def through_samples(seconds: Floats, positions: Floats) -> Profile:
     """Return the profile that joins samples by straight lines.
 
     Args:

@@ -7,7 +7,6 @@ import re
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -23,6 +22,7 @@ from pydantic_core import PydanticCustomError
 
 from replay.language.units import Angle, Length, Number, Size
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 
 
 class Part(BaseModel):
@@ -125,7 +125,7 @@ class Placement(Part):
             raise rejected("and rpy both give the rotation; keep one of the two", at=("quat_xyzw",))
         return self
 
-    def transform(self) -> NDArray[np.float64]:
+    def transform(self) -> Floats:
         """Return this as a transform (4, 4) into the frame that it is given in."""
         if self.quat_xyzw is not None:
             T = transforms.from_quaternion(np.array(self.quat_xyzw))

@@ -17,6 +17,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from replay.language import decimal_comma
+from replay.numerics.constants import FULL_TURN
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749446, 10**61)
 _DEGREE = _PI / 180
@@ -269,8 +270,6 @@ def json_schema(name: str, number: dict[str, Any], dimensions: tuple[Dimension, 
     pattern = rf"^\s*{_DECIMAL}(/[0-9]+)?\s*({'|'.join(unit.replace('^', chr(92) + '^') for unit in units)})\s*$"
     return {QUANTITY_KEY: name, "anyOf": [number, {"type": "string", "pattern": pattern}]}
 
-
-FULL_TURN: Final = 2.0 * math.pi
 
 _FAR = 1e12
 """Largest length [m] and joint position: its sixth power stays finite, and its rounding below 1 mm."""

@@ -159,10 +159,10 @@ class _InMemory:
         return True
 
     def open(self, *_: Any, **__: Any) -> io.BytesIO:
-        return _Counted(self._data)
+        return _CountedFile(self._data)
 
 
-class _Counted(io.BytesIO):
+class _CountedFile(io.BytesIO):
     """A file that is not read again and again, as an index asks for that names one place a thousand times."""
 
     def __init__(self, data: bytes) -> None:

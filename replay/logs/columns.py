@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import LimitError, RecordingError
-from replay.logs.mcap_chunks import Run
+from replay.logs.mcap_chunks import MessageRun
 from replay.logs.mcap_reader import McapLog
 from replay.logs.protobuf import message_type
 from replay.logs.wire import MessageShape, shape_of
+from replay.numerics.arrays import Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Topic:
 
     name: str
     schema: str
-    time: NDArray[np.int64]
+    time: Integers
     columns: dict[str, NDArray[Any]]
     texts: Mapping[str, str | bytes]
     messages: tuple[Message, ...] | None
@@ -48,7 +49,7 @@ def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str
     """
     room = _Room(log)
     wanted = {
-        channel.id: _Reader(log, channel.id, room)
+        channel.id: _ChannelReader(log, channel.id, room)
         for channel in sorted(log.channels.values(), key=lambda channel: channel.topic)
         if topics is None or channel.topic in topics
     }
@@ -66,7 +67,7 @@ def read_topics(log: McapLog, topics: Collection[str] | None = None) -> dict[str
     return result
 
 
-def _pass(log: McapLog, wanted: Mapping[int, _Reader]) -> None:
+def _pass(log: McapLog, wanted: Mapping[int, _ChannelReader]) -> None:
     for chunk in log.chunks_with(wanted):
         for run in log.runs(chunk):
             if run.channel in wanted:
@@ -98,7 +99,7 @@ class _Room:
             raise LimitError(str(self._log.path), rule)
 
 
-class _Reader:
+class _ChannelReader:
     """Collects the runs of one channel: as columns, until one does not fit; then everything again as messages."""
 
     def __init__(self, log: McapLog, channel: int, room: _Room) -> None:
@@ -121,14 +122,14 @@ class _Reader:
         """Forget what was read, and decode message by message from now on."""
         self._room_left.take(-sum(column.nbytes for column in getattr(self, "_columns", {}).values()))
         self._decoded = 0
-        self._times: list[NDArray[np.int64]] = []
+        self._times: list[Integers] = []
         self._shape: MessageShape | None = None
         self._columns: dict[str, NDArray[Any]] = {}
         self._count = 0
         self._messages: list[Message] = []
         self._decoding = True
 
-    def add(self, run: Run) -> None:
+    def add(self, run: MessageRun) -> None:
         """Take the next run."""
         if self._decoding:
             self._times.append(run.time)
@@ -159,7 +160,7 @@ class _Reader:
             messages = None if messages is None else tuple(messages[row] for row in order.tolist())
         return Topic(self.name, self._schema.name, time, columns, texts, messages)
 
-    def _add_rows(self, run: Run) -> bool:
+    def _add_rows(self, run: MessageRun) -> bool:
         if run.rows is None:
             return False
         if self._shape is None:

@@ -43,7 +43,7 @@ class Format:
     decimal: str | None = None
 
 
-class Table:
+class CsvTable:
     """The cells of a file.
 
     Attributes:

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import CurveError
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 _IN_BRACKETS = re.compile(r"(.*\S)\s*\[([^\]]+)\]")
 _AFTER_UNDERSCORE = re.compile(r"(.+)_([A-Za-z]+)")

@@ -11,13 +11,13 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import RecordingError
-from replay.logs.csv_table import Format, Table, unit_of
+from replay.logs.csv_table import CsvTable, Format, unit_of
 from replay.logs.excerpt import EXCERPT
 from replay.logs.joint_log import JointLog, Series, leading_zeros, unrepeated
 from replay.logs.times import date_nanoseconds, nanoseconds
+from replay.numerics.arrays import Floats
 
 _WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
 _WITH_POINT = re.compile(r"[-+]?[0-9]*\.[0-9]*([eE][-+]?[0-9]+)?")
@@ -42,13 +42,13 @@ def read_csv(name: str, data: bytes, format: Format, needed: Collection[str], ma
         RecordingError: the file is empty or not UTF-8, there is no such column, a line has another number of cells, or
             a cell is no finite number, or a time beyond 146 years.
     """
-    return _Log(name, Table(name, data, format), format, needed, max_gap).log()
+    return _Log(name, CsvTable(name, data, format), format, needed, max_gap).log()
 
 
 class _Log:
     """The numbers of a table."""
 
-    def __init__(self, name: str, table: Table, format: Format, needed: Collection[str], max_gap: int) -> None:
+    def __init__(self, name: str, table: CsvTable, format: Format, needed: Collection[str], max_gap: int) -> None:
         self._name = name
         self._table = table
         self._format = format
@@ -179,7 +179,7 @@ def _joint(heading: str) -> str:
     return unit_of(heading)[0].removesuffix(" position")
 
 
-def _values(cells: Sequence[str], decimal: str) -> NDArray[np.float64]:
+def _values(cells: Sequence[str], decimal: str) -> Floats:
     """Return the numbers in cells, NaN for what is none or not finite."""
     if decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]

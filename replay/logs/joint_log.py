@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import RecordingError
 from replay.logs.excerpt import EXCERPT, write_messages
@@ -16,6 +15,7 @@ from replay.logs.joint_messages import JOINTS, TRANSFORMS, Decoder, Sample, deco
 from replay.logs.mcap_records import Channel
 from replay.logs.message_log import Message, MessageLog
 from replay.logs.times import MAX_TIME
+from replay.numerics.arrays import Flags, Floats, Integers
 
 JOINT_TOPIC = "/joint_states"
 FRAME_TOPICS = ("/tf", "/tf_static")
@@ -39,9 +39,9 @@ class Series:
         by_turns: the publishers that give samples of it in the same span of time; empty if one alone does.
     """
 
-    time: NDArray[np.int64]
-    value: NDArray[np.float64]
-    row: NDArray[np.int64]
+    time: Integers
+    value: Floats
+    row: Integers
     by_turns: tuple[Publisher, ...] = ()
 
 
@@ -270,7 +270,7 @@ def _joined(by_publisher: Mapping[Publisher, Sequence[Series]]) -> Series:
     return Series(time[order], value[order], row[order], tuple(name for name, _ in found) if turns else ())
 
 
-def unrepeated(time: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.bool_]:
+def unrepeated(time: Integers, value: Floats) -> Flags:
     """Return which samples (n,) are not there before: at the same time with the same value (n,) or (n, k)."""
     if (time[1:] > time[:-1]).all():
         return np.ones(len(time), dtype=np.bool_)

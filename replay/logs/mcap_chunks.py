@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
 from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_records import MAX_CHUNK, MESSAGE_HEAD, RECORD_HEAD, Chunk, Op
 from replay.logs.work import Work
+from replay.numerics.arrays import Bytes, Integers
 
 MESSAGE_ROW = RECORD_HEAD + MESSAGE_HEAD
 """Bytes of a message record before its data."""
@@ -23,7 +23,7 @@ _channel_and_time = struct.Struct("<H4xQ").unpack_from
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class MessageRun:
     """Messages of one channel in a chunk.
 
     Attributes:
@@ -34,8 +34,8 @@ class Run:
     """
 
     channel: int
-    time: NDArray[np.int64]
-    rows: NDArray[np.uint8] | None
+    time: Integers
+    rows: Bytes | None
     payloads: tuple[bytes, ...]
 
     def messages(self) -> list[bytes]:
@@ -82,7 +82,7 @@ def _of_lz4(packed: bytes, size: int) -> bytes:
     return data
 
 
-def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
+def regular_run(file: str, chunk: Chunk, data: bytes) -> MessageRun | None:
     """Return a chunk's messages when all are of one channel and one length (found by one comparison), else None."""
     if len(data) < MESSAGE_ROW or data[0] != Op.MESSAGE:
         return None
@@ -95,10 +95,12 @@ def regular_run(file: str, chunk: Chunk, data: bytes) -> Run | None:
     stamps = rows[:, 15:23].copy().view("<u8")[:, 0]
     _check_time(file, chunk, int(stamps.max()))
     channel = int.from_bytes(data[9:11], "little")
-    return Run(channel, stamps.astype(np.int64), rows[:, MESSAGE_ROW:], ())
+    return MessageRun(channel, stamps.astype(np.int64), rows[:, MESSAGE_ROW:], ())
 
 
-def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None], work: Work) -> list[Run]:
+def mixed_runs(
+    file: str, chunk: Chunk, data: bytes, define: Callable[[int, bytes], None], work: Work
+) -> list[MessageRun]:
     """Return the messages of any chunk by channel; `define` is called with its schema and channel records."""
     found: dict[int, tuple[list[int], list[bytes]]] = {}
     number = 0
@@ -119,12 +121,12 @@ def mixed_runs(file: str, chunk: Chunk, data: bytes, define: Callable[[int, byte
     return [_run(channel, times, payloads) for channel, (times, payloads) in sorted(found.items())]
 
 
-def _run(channel: int, times: list[int], payloads: list[bytes]) -> Run:
+def _run(channel: int, times: list[int], payloads: list[bytes]) -> MessageRun:
     length = len(payloads[0])
     if not length or any(len(payload) != length for payload in payloads):
-        return Run(channel, np.array(times, dtype=np.int64), None, tuple(payloads))
+        return MessageRun(channel, np.array(times, dtype=np.int64), None, tuple(payloads))
     rows = np.frombuffer(b"".join(payloads), dtype=np.uint8).reshape(-1, length)
-    return Run(channel, np.array(times, dtype=np.int64), rows, ())
+    return MessageRun(channel, np.array(times, dtype=np.int64), rows, ())
 
 
 def records(file: str, data: bytes, most: int) -> Iterator[tuple[int, int, int]]:

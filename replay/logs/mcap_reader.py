@@ -23,7 +23,7 @@ from replay import limits
 from replay.errors import LimitError, RecordingError
 from replay.lfs_pointer import LARGEST_POINTER, LFS_POINTER, is_lfs_pointer
 from replay.logs.loss import Loss
-from replay.logs.mcap_chunks import MESSAGE_ROW, Run, mixed_runs, regular_run, unpack
+from replay.logs.mcap_chunks import MESSAGE_ROW, MessageRun, mixed_runs, regular_run, unpack
 from replay.logs.mcap_records import (
     DATA_SECTION,
     MAGIC,
@@ -163,7 +163,7 @@ class McapLog:
             if not trusted or not chunk.channels or any(channel in channels for channel in chunk.channels)
         ]
 
-    def runs(self, chunk: Chunk) -> Iterator[Run]:
+    def runs(self, chunk: Chunk) -> Iterator[MessageRun]:
         """Yield the messages of a chunk, unpacked and verified."""
         data = unpack(self._file, chunk, self._bytes_at(chunk.begin, chunk.compressed_size))
         run = regular_run(self._file, chunk, data)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.logs.mcap_records import MAGIC, MAX_CHUNK, MAX_RECORD, MESSAGE_HEAD, PREAMBLE, RECORD_HEAD, Op, Schema
+from replay.numerics.arrays import Integers
 
 _ZSTD_LEVEL = 3
 _CHUNK_BYTES = 1 << 26  # beyond, a block of one topic is cut into several chunks: readers hold a chunk in memory
@@ -39,7 +40,7 @@ class MessageRows:
         data: (n, length) the messages' own bytes, to be filled by the caller.
     """
 
-    def __init__(self, channel: int, time: NDArray[np.int64], first_sequence: int, length: int) -> None:
+    def __init__(self, channel: int, time: Integers, first_sequence: int, length: int) -> None:
         """Make n records for messages at `time` [ns], numbered from `first_sequence` on."""
         n = len(time)
         self.channel = channel
@@ -188,16 +189,14 @@ class McapFileWriter:
             schema_count=len(self._schemas),
         )
 
-    def _chunk(self, channel: int, time: NDArray[np.int64], offsets: NDArray[np.uint64], data: bytes) -> None:
+    def _chunk(self, channel: int, time: Integers, offsets: NDArray[np.uint64], data: bytes) -> None:
         if len(data) > MAX_CHUNK:
             raise InvalidValue(
                 "size of a message", len(data), f"a message in a recording has at most {MAX_CHUNK} bytes"
             )
         self.packed(channel, time, offsets, data, self._compressor.compress(data))
 
-    def packed(
-        self, channel: int, time: NDArray[np.int64], offsets: NDArray[np.uint64], data: bytes, compressed: bytes
-    ) -> None:
+    def packed(self, channel: int, time: Integers, offsets: NDArray[np.uint64], data: bytes, compressed: bytes) -> None:
         """Write message records of one channel, and the same compressed by zstd, as one chunk.
 
         Args:

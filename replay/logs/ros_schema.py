@@ -19,7 +19,7 @@ _IDL_SEPARATOR = "=" * 80 + "\n"
 
 
 @dataclass(frozen=True)
-class Field:
+class RosField:
     """A field of a message.
 
     Attributes:
@@ -36,12 +36,12 @@ class Field:
 
 
 _BUILT_IN = {
-    f"builtin_interfaces/msg/{kind}": (Field("sec", "int32", 1, False), Field("nanosec", "uint32", 1, False))
+    f"builtin_interfaces/msg/{kind}": (RosField("sec", "int32", 1, False), RosField("nanosec", "uint32", 1, False))
     for kind in ("Time", "Duration")
 }
 """What definitions may refer to without describing it."""
 
-Types = Mapping[str, tuple[Field, ...]]
+Types = Mapping[str, tuple[RosField, ...]]
 """Fields by the name of the message type, such as "std_msgs/msg/Header"."""
 
 
@@ -51,13 +51,13 @@ def long_name(name: str) -> str:
     return f"{package}/{rest if '/' in rest else f'msg/{rest}'}"
 
 
-class _Counted(str):
+class _CountedText(str):
     """A text that is not looked at without end."""
 
     __slots__ = ("_looks",)
     _looks: int
 
-    def __new__(cls, text: str) -> _Counted:
+    def __new__(cls, text: str) -> _CountedText:
         made = super().__new__(cls, text)
         made._looks = 0
         return made
@@ -97,7 +97,7 @@ def types_of(name: str, text: str, *, ros1: bool = False) -> Types:
             bodies = [
                 re.sub(r"\A\s*IDL: .*\n|^[ \t]*#.*$", "", part, flags=re.MULTILINE) for part in parts if part.strip()
             ]
-            found = {key: value for body in bodies for key, value in get_types_from_idl(_Counted(body)).items()}
+            found = {key: value for body in bodies for key, value in get_types_from_idl(_CountedText(body)).items()}
         else:
             found = get_types_from_msg(text, own)
     except (TypesysError, ValueError, KeyError, IndexError, AssertionError, RecursionError) as error:
@@ -119,16 +119,16 @@ def standard_types(*, ros1: bool = False) -> Types:
     return _fields(get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE).fielddefs)
 
 
-def _fields(found: Mapping[str, Any]) -> dict[str, tuple[Field, ...]]:
+def _fields(found: Mapping[str, Any]) -> dict[str, tuple[RosField, ...]]:
     from rosbags.interfaces import Nodetype
 
-    def field(name: str, description: tuple[Any, Any]) -> Field:
+    def field(name: str, description: tuple[Any, Any]) -> RosField:
         kind, what = description
         if kind == Nodetype.BASE:
-            return Field(name, what[0], 1, False)
+            return RosField(name, what[0], 1, False)
         if kind == Nodetype.NAME:
-            return Field(name, what, 1, False)
+            return RosField(name, what, 1, False)
         inner, count = what
-        return Field(name, field(name, inner).type, count if kind == Nodetype.ARRAY else 0, True)
+        return RosField(name, field(name, inner).type, count if kind == Nodetype.ARRAY else 0, True)
 
     return {key: tuple(field(*entry) for entry in value[1]) for key, value in found.items()}

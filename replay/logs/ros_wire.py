@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from replay import limits
-from replay.logs.ros_schema import Field, Types
+from replay.logs.ros_schema import RosField, Types
 
 _CODES = {
     "bool": ("?", 1),
@@ -92,7 +92,7 @@ def decode_cdr(types: Types, name: str, data: bytes, memo: Memo | None = None) -
 def _whole(
     types: Types, name: str, data: bytes, begin: int, encoding: Encoding, padding: int, memo: Memo | None
 ) -> dict[str, Any]:
-    reader = _Reader(types, data, begin, encoding, {} if memo is None else memo)
+    reader = _WireReader(types, data, begin, encoding, {} if memo is None else memo)
     try:
         message = reader.struct(name, 0)
     except struct.error:
@@ -104,7 +104,7 @@ def _whole(
     return message
 
 
-class _Reader:
+class _WireReader:
     """Reads values one after another; alignment counts from the first one."""
 
     def __init__(self, types: Types, data: bytes, begin: int, encoding: Encoding, memo: Memo) -> None:
@@ -133,7 +133,7 @@ class _Reader:
         self._check(end)
         return values
 
-    def _field(self, field: Field, depth: int) -> Any:
+    def _field(self, field: RosField, depth: int) -> Any:
         if not field.array:
             return self._value(field.type, depth)
         if field.type in _CODES:

@@ -17,12 +17,9 @@ from typing import Any
 
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
-
-Rows = NDArray[np.uint8]
-Column = NDArray[Any]
+from replay.numerics.arrays import Bytes, Column
 
 _FIXED = {
     FieldDescriptor.TYPE_DOUBLE: "<f8",
@@ -73,7 +70,7 @@ class Slot:
         """Offset of the first byte after the slot."""
         return self.offset + self.width * self.count
 
-    def read(self, rows: Rows) -> Column:
+    def read(self, rows: Bytes) -> Column:
         """Return the field's values in n messages, a view where the encoding allows it."""
         data = rows[:, self.offset : self.end]
         if self.field_type in _FIXED:
@@ -82,7 +79,7 @@ class Slot:
             values = self._read_varints(data)
         return values if self.is_array else values[:, 0]
 
-    def write(self, rows: Rows, values: Column) -> None:
+    def write(self, rows: Bytes, values: Column) -> None:
         """Set the field in n messages; `values` is (n, count) for an array and (n,) for a scalar."""
         values = values if self.is_array else values[:, None]
         data = rows[:, self.offset : self.end]
@@ -105,11 +102,11 @@ class Slot:
         mine, theirs = ((slot.field_type, slot.width, slot.count) for slot in (self, other))
         return mine == theirs
 
-    def copy(self, rows: Rows, other: Slot) -> None:
+    def copy(self, rows: Bytes, other: Slot) -> None:
         """Set the field in n messages to the values of another one that is like it."""
         rows[:, self.offset : self.end] = rows[:, other.offset : other.end]
 
-    def _read_varints(self, data: Rows) -> Column:
+    def _read_varints(self, data: Bytes) -> Column:
         if self.width == 1 and self.field_type not in _ZIGZAG:
             narrow: Column = data.astype(_VARINT[self.field_type])
             return narrow
@@ -138,8 +135,8 @@ class MessageShape:
         texts: the texts and byte strings, by path; they are the same in every message.
     """
 
-    skeleton: Rows
-    mask: Rows
+    skeleton: Bytes
+    mask: Bytes
     slots: Mapping[str, Slot]
     texts: Mapping[str, str | bytes]
 
@@ -148,11 +145,11 @@ class MessageShape:
         """Bytes in one message."""
         return len(self.skeleton)
 
-    def fill(self, rows: Rows) -> None:
+    def fill(self, rows: Bytes) -> None:
         """Write what all messages have in common into (n, length) bytes; the values follow by `Slot.write`."""
         rows[:] = self.skeleton
 
-    def fits(self, rows: Rows) -> bool:
+    def fits(self, rows: Bytes) -> bool:
         """Return whether all of n messages (n, length) have this shape."""
         return rows.shape[1] == self.length and bool(((rows & self.mask) == self.skeleton).all())
 

@@ -6,11 +6,10 @@ import numbers
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import InvalidValue
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
 def as_floats(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import kernel, leaf_kernel
 
 Pair = tuple[float, float]
@@ -140,7 +138,7 @@ def scale(factor: Pair, u: Vector) -> Vector:
 
 
 @kernel
-def triangle_area(triangle: NDArray[np.float64]) -> float:
+def triangle_area(triangle: Floats) -> float:
     """Return the area [m^2] of a triangle (3, 3) [m], with full relative precision however thin it is."""
     x0, y0, z0 = triangle[0, 0], triangle[0, 1], triangle[0, 2]
     ux, uy, uz = two_sum(triangle[1, 0], -x0), two_sum(triangle[1, 1], -y0), two_sum(triangle[1, 2], -z0)

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.double_double import Pair, triangle_area
 from replay.numerics.jit import kernel
 
-Limbs = NDArray[np.int64]
 Row = tuple[Pair, Pair, float]
 """u and v, each an unevaluated sum of two doubles, and z."""
 
@@ -38,7 +37,7 @@ _SMALLEST = 1e-200
 
 
 @kernel
-def _add(total: Limbs, a: float, b: float, c: float) -> None:
+def _add(total: Integers, a: float, b: float, c: float) -> None:
     """Add a b c to a fixed-point number, exactly."""
     if a == 0.0 or b == 0.0 or c == 0.0:
         return
@@ -85,7 +84,7 @@ def _add(total: Limbs, a: float, b: float, c: float) -> None:
 
 
 @kernel
-def _sign(total: Limbs) -> int:
+def _sign(total: Integers) -> int:
     carry = np.int64(0)
     some = False
     for k in range(len(total)):
@@ -135,7 +134,7 @@ def sign_of_determinant(a: Row, b: Row, c: Row) -> int:
 
 
 @kernel
-def has_area(triangle: NDArray[np.float64]) -> bool:
+def has_area(triangle: Floats) -> bool:
     """Return whether the corners of a triangle (3, 3) are not on one line, exactly."""
     for i in range(3):
         j = (i + 1) % 3
@@ -150,7 +149,7 @@ def has_area(triangle: NDArray[np.float64]) -> bool:
 
 
 @kernel
-def area_or_zero(triangle: NDArray[np.float64]) -> float:
+def area_or_zero(triangle: Floats) -> float:
     """Return `triangle_area`, and 0 where that is the exact area but rounding left something."""
     area = triangle_area(triangle)
     size = 0.0

@@ -9,7 +9,8 @@ from __future__ import annotations
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from replay.numerics.arrays import Floats
 
 NODES_4 = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263])
 WEIGHTS_4 = np.array([0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692])
@@ -111,7 +112,7 @@ WEIGHTS_16 = np.array(
 )
 
 
-def _symmetric_rule(centre: float, *orbits: tuple[float, ...]) -> NDArray[np.float64]:
+def _symmetric_rule(centre: float, *orbits: tuple[float, ...]) -> Floats:
     """Return (4, k) barycentric coordinates and weights: orbits (weight, a) of (1-2a, a, a), (weight, a, b) of all."""
     rows: list[tuple[float, ...]] = [(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, centre)]
     for weight, *place in orbits:

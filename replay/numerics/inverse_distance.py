@@ -31,9 +31,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.gauss import (
     NODES_4,
     NODES_8,
@@ -46,8 +44,6 @@ from replay.numerics.gauss import (
 )
 from replay.numerics.jit import kernel
 from replay.numerics.triples import UNDERFLOW, Triple, along, cross, dot, minus, norm
-
-Nodes = NDArray[np.float64]
 
 _FAR = 3.0
 """Distance of the centroid in longest edges from which a triangle is integrated by a Gauss rule."""
@@ -103,7 +99,7 @@ def mean_over_segment(p: Triple, q: Triple) -> float:
 
 
 @kernel
-def _gauss_mean(a: Triple, b: Triple, c: Triple, nodes: Nodes, weights: Nodes) -> float:
+def _gauss_mean(a: Triple, b: Triple, c: Triple, nodes: Floats, weights: Floats) -> float:
     """Return the mean of 1/|r| over a triangle by the product rule collapsed into corner a."""
     total = 0.0
     for j in range(len(nodes)):

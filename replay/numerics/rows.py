@@ -7,6 +7,8 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.arrays import Integers
+
 Number = TypeVar("Number", bound=np.generic)
 
 
@@ -20,8 +22,8 @@ class DistinctRows(NamedTuple, Generic[Number]):
     """
 
     rows: NDArray[Number]
-    first: NDArray[np.int64]
-    kind: NDArray[np.int64]
+    first: Integers
+    kind: Integers
 
 
 def distinct_rows(table: NDArray[Number]) -> DistinctRows[Number]:

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
-def identity(*shape: int) -> Array:
+def identity(*shape: int) -> Floats:
     """Return identity transforms of shape (*shape, 4, 4)."""
     result = np.zeros((*shape, 4, 4))
     for axis in range(4):
@@ -22,7 +21,7 @@ def identity(*shape: int) -> Array:
     return result
 
 
-def compose(T_a_b: Array, T_b_c: Array) -> Array:
+def compose(T_a_b: Floats, T_b_c: Floats) -> Floats:
     """Return T_a_c = T_a_b T_b_c for rigid transforms of shape (..., 4, 4), broadcast against each other."""
     result = np.empty(np.broadcast_shapes(T_a_b.shape, T_b_c.shape))
     rows = result[..., :3, :]
@@ -34,7 +33,7 @@ def compose(T_a_b: Array, T_b_c: Array) -> Array:
     return result
 
 
-def invert(T_a_b: Array) -> Array:
+def invert(T_a_b: Floats) -> Floats:
     """Return T_b_a for rigid transforms of shape (..., 4, 4): rotation transposed, origin taken back."""
     result = np.zeros(T_a_b.shape)
     result[..., :3, :3] = np.swapaxes(T_a_b[..., :3, :3], -1, -2)
@@ -47,24 +46,24 @@ def invert(T_a_b: Array) -> Array:
     return result
 
 
-def apply(T_a_b: Array, points: Array) -> Array:
+def apply(T_a_b: Floats, points: Floats) -> Floats:
     """Return points (..., 3) given in b, in a; leading shapes are broadcast."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     rows = [T_a_b[..., r, 0] * x + T_a_b[..., r, 1] * y + T_a_b[..., r, 2] * z + T_a_b[..., r, 3] for r in range(3)]
     return np.stack(rows, axis=-1)
 
 
-def sine(angle: Array) -> Array:
+def sine(angle: Floats) -> Floats:
     """Return the sine [-] of angles [rad], element by element with the C library's function."""
     return np.array([math.sin(value) for value in angle.ravel().tolist()]).reshape(angle.shape)
 
 
-def cosine(angle: Array) -> Array:
+def cosine(angle: Floats) -> Floats:
     """Return the cosine [-] of angles [rad], element by element with the C library's function."""
     return np.array([math.cos(value) for value in angle.ravel().tolist()]).reshape(angle.shape)
 
 
-def from_translation(xyz: Array) -> Array:
+def from_translation(xyz: Floats) -> Floats:
     """Return transforms (..., 4, 4) that move by xyz (..., 3) [m]."""
     xyz = np.asarray(xyz, dtype=np.float64)
     result = identity(*xyz.shape[:-1])
@@ -72,7 +71,7 @@ def from_translation(xyz: Array) -> Array:
     return result
 
 
-def from_axis_angle(axis: Array, angle: Array) -> Array:
+def from_axis_angle(axis: Floats, angle: Floats) -> Floats:
     """Return transforms (..., 4, 4) that turn by angle (...) [rad] about the unit axis (3,) (Rodrigues)."""
     x, y, z = (float(value) for value in axis)
     s, c = sine(angle), cosine(angle)
@@ -85,7 +84,7 @@ def from_axis_angle(axis: Array, angle: Array) -> Array:
     return result
 
 
-def from_rpy(rpy: Array) -> Array:
+def from_rpy(rpy: Floats) -> Floats:
     """Return transforms (..., 4, 4) for roll, pitch, yaw (..., 3) [rad]: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF."""
     rpy = np.asarray(rpy, dtype=np.float64)
     roll = from_axis_angle(np.array([1.0, 0.0, 0.0]), rpy[..., 0])
@@ -94,7 +93,7 @@ def from_rpy(rpy: Array) -> Array:
     return compose(yaw, compose(pitch, roll))
 
 
-def from_quaternion(quat_xyzw: Array) -> Array:
+def from_quaternion(quat_xyzw: Floats) -> Floats:
     """Return transforms (..., 4, 4) for quaternions (..., 4) in xyzw order; they are normalised first."""
     q = np.asarray(quat_xyzw, dtype=np.float64)
     q = q / np.sqrt(q[..., 0] ** 2 + q[..., 1] ** 2 + q[..., 2] ** 2 + q[..., 3] ** 2)[..., None]
@@ -108,7 +107,7 @@ def from_quaternion(quat_xyzw: Array) -> Array:
     return result
 
 
-def to_quaternion(T_a_b: Array) -> Array:
+def to_quaternion(T_a_b: Floats) -> Floats:
     """Return unit quaternions (..., 4), xyzw, w >= 0, of rigid transforms (..., 4, 4).
 
     The largest of the four squared components is taken from the diagonal and the others from it (Shepperd 1978), so
@@ -135,7 +134,7 @@ def to_quaternion(T_a_b: Array) -> Array:
     return q + 0.0  # -0.0 becomes 0.0
 
 
-def slerp(start: Array, end: Array, fraction: Array) -> Array:
+def slerp(start: Floats, end: Floats, fraction: Floats) -> Floats:
     """Return unit quaternions (..., 4) xyzw on the shortest arc from start to end at fraction (...) in [0, 1]."""
     dot = np.sum(start * end, axis=-1)
     end = np.where(dot[..., None] < 0.0, -end, end)
@@ -152,6 +151,6 @@ def slerp(start: Array, end: Array, fraction: Array) -> Array:
     safe = np.where(straight, 1.0, whole)
     a = np.where(straight, 1.0 - fraction, sine((1.0 - fraction) * angle) / safe)
     b = np.where(straight, fraction, sine(fraction * angle) / safe)
-    q: Array = a[..., None] * start + b[..., None] * end
-    unit: Array = q / np.sqrt(np.sum(q**2, axis=-1))[..., None]
+    q: Floats = a[..., None] * start + b[..., None] * end
+    unit: Floats = q / np.sqrt(np.sum(q**2, axis=-1))[..., None]
     return unit

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from replay.collision.columns import CollisionColumns
+from replay.numerics.arrays import Floats
 from replay.numerics.columns import Field
-from replay.recording.scene_view import Floats
 from replay.sensing.kind import SensorKind
 from replay.sensing.kinds import KINDS
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from replay.numerics.arrays import Floats
 from replay.recording import blueprint
 from replay.recording.rerun_columns import Chunks, Column, constants, made
-from replay.recording.scene_view import Floats
 
 _EYE, _AXIS = "EyeControls3D", "TimeAxis"  # what the library calls the parts that differ
 

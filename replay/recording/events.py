@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.numerics.arrays import Flags, Integers
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
-
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 _FIELDS = [*CollisionColumns.fields(), *(field for kind in KINDS.values() for field in kind.columns.fields())]
 SEVERITY = {event: severity for field in _FIELDS for event, severity in field.events.items()}

@@ -6,7 +6,6 @@ Numbers keep all their digits. What is not a number stays so: `nan`, `inf` and `
 
 from __future__ import annotations
 
-import fnmatch
 import functools
 import json
 import re
@@ -15,21 +14,21 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay import limits
 from replay.errors import InvalidValue, LimitError
+from replay.kinematics.linkage import WORLD
+from replay.language.globs import fits
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
 from replay.logs.tables import topic_table
+from replay.numerics.arrays import Column
 from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
-from replay.recording.topics import WORLD
 from replay.sensing.kinds import KINDS
 from replay.simulation import Layout
 
-Column = NDArray[Any]
 Table = dict[str, Column]
 Format = Literal["csv", "json", "parquet"]
 
@@ -99,9 +98,9 @@ def export(
         raise InvalidValue("format", format, f"must be one of {', '.join(FORMATS)}")
     sources = _sources(recording, tell)
     for pattern in topics:
-        if not fnmatch.filter(sources, pattern):
+        if not any(fits(topic, pattern) for topic in sources):
             raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
-    chosen = [topic for topic in sorted(sources) if any(fnmatch.fnmatchcase(topic, pattern) for pattern in topics)]
+    chosen = [topic for topic in sorted(sources) if any(fits(topic, pattern) for pattern in topics)]
     if isinstance(recording, McapLog) and len(chosen) * recording.work.unpacked > limits.passes(recording.size):
         rule = f"has {len(chosen)} topics to be looked for in {recording.work.unpacked} bytes; choose some with --topic"
         raise LimitError(str(recording.path), rule)

@@ -16,6 +16,7 @@ from replay.logs.columns import Topic, read_topics
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.columns import Field
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import read_events
@@ -23,8 +24,6 @@ from replay.recording.events import Events
 from replay.recording.provenance import RECORD, Provenance, sha256
 from replay.sensing.kinds import KINDS, of_kind
 from replay.simulation import Layout
-
-Floats = NDArray[np.float64]
 
 FRAMES = "/joint_states"
 """The topic that is in every recording and tells its frames."""
@@ -58,7 +57,7 @@ class Recording:
 
     path: Path
     provenance: Provenance
-    time: NDArray[np.int64]
+    time: Integers
     joint_positions: Floats
     joint_velocities: Floats
     link_poses: Floats
@@ -208,7 +207,7 @@ class _Assembly:
         if missing:
             raise RecordingError(self._file, f"damaged: topics are missing: {missing}")
 
-    def _whole_frames(self) -> NDArray[np.int64]:
+    def _whole_frames(self) -> Integers:
         """Return the times of the frames of whole blocks: those that every topic of the recording has."""
         per_frame = self._topics.values()
         time = self._topic(FRAMES).time

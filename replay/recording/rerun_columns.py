@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from replay.numerics.arrays import Integers, ShortIntegers
 from replay.recording.blueprint import TIMELINE
 
-Lengths = int | NDArray[np.int64]
+Lengths = int | Integers
 """How many elements each list has: one number for all lists, or (n,) numbers."""
 
 Column = tuple[Any, Any]
@@ -57,7 +58,7 @@ def packed(colors: ArrayLike) -> NDArray[np.uint32]:
     return np.ascontiguousarray(colors, dtype=np.uint8).view(">u4")[:, 0].astype(np.uint32)
 
 
-def index_of(time: NDArray[np.int64], frames: NDArray[np.int64]) -> Index:
+def index_of(time: Integers, frames: Integers) -> Index:
     """Return rows' times [ns] and frames as the two timelines of a recording."""
     import pyarrow as pa
 
@@ -159,7 +160,7 @@ def _component(archetype: str, field: str) -> _Component:
     return _Component(batch.component_descriptor(), batch.as_arrow_array().type)
 
 
-def _ends(count: int, lengths: Lengths | None = None) -> NDArray[np.int32]:
+def _ends(count: int, lengths: Lengths | None = None) -> ShortIntegers:
     """Return where lists end, and 0 before: all `count` elements in one list when there are no lengths."""
     if lengths is None:
         return np.array([0, count], dtype=np.int32)
@@ -176,14 +177,14 @@ def _one(elements: Any) -> Any:
     return _cut(pa.list_(elements.type), elements, _ends(len(elements)))
 
 
-def _cut(lists: Any, elements: Any, ends: NDArray[np.int32]) -> Any:
+def _cut(lists: Any, elements: Any, ends: ShortIntegers) -> Any:
     import pyarrow as pa
 
     assert ends[-1] == len(elements), "lengths must add up to the number of elements"
     return pa.Array.from_buffers(lists, len(ends) - 1, [None, pa.py_buffer(ends)], children=[elements])
 
 
-def _flat(kind: Any, values: NDArray[np.int64]) -> Any:
+def _flat(kind: Any, values: Integers) -> Any:
     import pyarrow as pa
 
     return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from replay.collision.columns import Level
 from replay.numerics import transforms
+from replay.numerics.arrays import Flags, Floats
 from replay.recording import blueprint
 from replay.recording.blueprint_parts import RecordingBlueprint
 from replay.recording.events import EventFinder
@@ -23,9 +24,6 @@ from replay.recording.rerun_file import RerunFile
 from replay.recording.rerun_scene import beam_path, body_path, extent, log_curve, log_scene
 from replay.recording.scene_view import SceneView
 from replay.simulation import FrameBlock, Layout
-
-Flags = NDArray[np.bool_]
-Floats = NDArray[np.float64]
 
 APPLICATION = "replay"
 LEVEL_COLORS = {Level.BOUNDS: (255, 150, 20, 255), Level.CONTACT: (235, 35, 35, 255)}

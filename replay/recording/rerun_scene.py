@@ -8,9 +8,10 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.recording import blueprint
 from replay.recording.rerun_columns import Chunks, Column, column, constants, entity, packed, row
-from replay.recording.scene_view import BodyView, Floats, SceneView
+from replay.recording.scene_view import BodyView, SceneView
 from replay.recording.surfaces import corner_normals
 from replay.sensing.kind import Color
 from replay.sensing.kinds import KINDS

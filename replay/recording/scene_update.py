@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from replay.logs.wire import MessageShape, shape_of
+from replay.numerics.arrays import Floats, Integers
 from replay.recording import messages
-from replay.recording.scene_view import BodyView, Floats, Integers, SceneView
+from replay.recording.scene_view import BodyView, SceneView
 
 
 def scene_message(scene: SceneView) -> bytes:

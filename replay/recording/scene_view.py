@@ -8,16 +8,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.kind import Color, Drawing
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.scenario.scene import Scene
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from replay.errors import ViewerError
+from replay.numerics.arrays import Floats
 from replay.recording import blueprint
 from replay.recording.own_folder import own_folder
 from replay.recording.rerun_file import RerunFile
-from replay.recording.scene_view import Floats
 
 _EYE = ("EyeControls3D:position", "EyeControls3D:look_target")
 _SOMEWHERE = np.array([3.0, -4.0, 3.0]), np.zeros(3)  # where recordings that are not ours are looked at from
@@ -67,7 +67,7 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
     try:
         stream = result.open("replay: side by side")
         stream.send_recording_name(" | ".join(sides))
-        found = _Found()
+        found = _Contents()
         for side, file in zip(sides, files, strict=True):
             with _readable(file) as reader:
                 found.look_from(reader)
@@ -97,7 +97,7 @@ def _readable(file: Path) -> Iterator[Any]:
         raise ViewerError(f"{file}: cannot be read: {str(error).splitlines()[0]}") from None
 
 
-class _Found:
+class _Contents:
     """What the recordings have: charts, their end [ns], and from where to where each looks at its scene."""
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class _Found:
                     self.eyes.append((eye, target))
 
 
-def _copy(stream: Any, chunk: Any, side: str, found: _Found) -> None:
+def _copy(stream: Any, chunk: Any, side: str, found: _Contents) -> None:
     """Send a chunk below the name of its side."""
     import rerun as rr
 

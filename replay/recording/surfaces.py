@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from replay.recording.scene_view import Floats, Meshes
+from replay.numerics.arrays import Floats
+from replay.recording.scene_view import Meshes
 
 _CREASE = 0.8
 """Cosine of the angle between two faces below which the edge between them is drawn sharp."""

@@ -12,23 +12,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
+from replay.kinematics.linkage import WORLD
 from replay.logs.mcap_writer import MessageRows
 from replay.logs.wire import MessageShape, Slot, shape_of
+from replay.numerics.arrays import Column
 from replay.numerics.columns import Field, components
+from replay.numerics.constants import SECOND
 from replay.recording import messages
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
 
-Column = NDArray[Any]
 Columns = dict[str, Column]
 
-WORLD = "world"
 """The coordinate frame that every link's transform starts from."""
 
-_SECOND = 1_000_000_000
 _WIDE_SECONDS = 1 << 34  # an example time stamp whose varints have five bytes: room for 2^35 s
 _WIDE_NANOS = 1 << 29
 _STAMP = {"seconds": _WIDE_SECONDS, "nanos": _WIDE_NANOS}
@@ -114,7 +113,7 @@ def _shape(type_: str, example: bytes) -> MessageShape:
 
 
 def _stamps(block: FrameBlock, *prefixes: str) -> Columns:
-    seconds, nanos = block.time // _SECOND, block.time % _SECOND
+    seconds, nanos = block.time // SECOND, block.time % SECOND
     return {
         f"{prefix}.{part}": values for prefix in prefixes for part, values in (("seconds", seconds), ("nanos", nanos))
     }

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from replay.errors import InvalidValue
+from replay.kinematics.linkage import WORLD
 from replay.logs.mcap_records import MAGIC
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import PartFile
@@ -16,7 +17,7 @@ from replay.recording.events import EventFinder
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.scene_update import scene_message
 from replay.recording.scene_view import SceneView
-from replay.recording.topics import WORLD, FrameTopic, frame_topics
+from replay.recording.topics import FrameTopic, frame_topics
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock
 

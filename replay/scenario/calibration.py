@@ -11,19 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import CalibrationError, CurveError, InvalidValue
 from replay.kinematics.linkage import Joint
 from replay.kinematics.motion import sample
 from replay.language.units import ANGLE, CAPACITANCE, DIMENSION_OF, LENGTH, VOLTAGE, Dimension, quantity_rule
 from replay.logs.curve_csv import Column, Curve
+from replay.numerics.arrays import Floats
 from replay.scenario.model import Scenario
 from replay.scenario.scene import build
 from replay.sensing.calibration import CONFIDENCE, QUANTITIES, Calibration, Quantity, calibrate
 from replay.sensing.capacitive.kind import Capacitive
-
-Floats = NDArray[np.float64]
 
 _DIGITS = 10
 """Of fitted numbers in a sensor file; the model itself is good to 6."""

@@ -11,8 +11,8 @@ import numpy as np
 from replay.errors import RecordingExistsError
 from replay.logs.part_file import write_file
 from replay.scenario.calibration import CurveFit, sensor_file
+from replay.scenario.curve_plot import Line, Panel, draw
 from replay.sensing.calibration import CONFIDENCE, Estimate
-from replay.sensing.curve_plot import Line, Panel, draw
 
 
 def text(fit: CurveFit) -> str:

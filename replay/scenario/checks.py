@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from replay.kinematics.linkage import WORLD
 from replay.language.units import (
     ACCELERATION,
     ANGLE,
@@ -18,8 +19,6 @@ from replay.scenario.expectations import PairExpectation
 from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
 from replay.scenario.problems import Path, did_you_mean
 from replay.sensing.kinds import KINDS
-
-WORLD = "world"
 
 Finding = tuple[Path, str]
 """The path of a value, and the rule it breaks."""

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, StringConstraints
 
+from replay.collision.columns import MARGIN
 from replay.language.fields import Glob, Part, rejected
 from replay.language.units import Distance
 
@@ -18,7 +19,7 @@ def _reaches(margin: float) -> float:
     return margin
 
 
-class Disable(Part):
+class DisablePart(Part):
     """Pairs that are not tested."""
 
     pair: GlobPair
@@ -27,12 +28,12 @@ class Disable(Part):
     """Why these may touch, or never can."""
 
 
-class Collision(Part):
+class CollisionPart(Part):
     """Which pairs of shapes are tested, and how closely clearances are followed."""
 
     pairs: Literal["all", "none"] = "all"
     """"all": every pair of shapes on different links that are not joined by a joint; "none": no pair."""
-    margin: Annotated[Distance, AfterValidator(_reaches)] = 0.05
+    margin: Annotated[Distance, AfterValidator(_reaches)] = MARGIN
     """Clearances up to this one are computed [m] (model.collision.clearance: near)."""
-    disable: tuple[Disable, ...] = ()
+    disable: tuple[DisablePart, ...] = ()
     """Pairs that are left out, each with its reason."""

@@ -27,7 +27,7 @@ _MERGED_MAPS: Final = {
 _MERGED_LISTS: Final = {("motion", "moves"), ("collision", "disable"), ("expect",)}
 
 
-class Text:
+class ScenarioText:
     """All text files of one scenario: read once, merged, with every problem found.
 
     Attributes:

@@ -33,19 +33,19 @@ class JointPart(Part):
     """Unique among all joints; the link's name when left out."""
 
 
-class Fixed(JointPart):
+class FixedPart(JointPart):
     """Does not move."""
 
     type: Literal["fixed"]
 
 
-class Free(JointPart):
+class FreePart(JointPart):
     """Moves by the pose key frames of motion.free."""
 
     type: Literal["free"]
 
 
-class Revolute(JointPart):
+class RevolutePart(JointPart):
     """Turns about an axis."""
 
     type: Literal["revolute"]
@@ -68,7 +68,7 @@ class Revolute(JointPart):
         return self
 
 
-class Continuous(JointPart):
+class ContinuousPart(JointPart):
     """Turns about an axis without position limits."""
 
     type: Literal["continuous"]
@@ -82,7 +82,7 @@ class Continuous(JointPart):
     """Position [rad] while nothing has moved the joint."""
 
 
-class Prismatic(JointPart):
+class PrismaticPart(JointPart):
     """Slides along an axis."""
 
     type: Literal["prismatic"]
@@ -105,7 +105,7 @@ class Prismatic(JointPart):
         return self
 
 
-def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
+def _check_limits(joint: RevolutePart | PrismaticPart, unit: str) -> None:
     if joint.lower > joint.upper:
         raise rejected(f"must not be above the upper limit {joint.upper:.6g} {unit}", at=("lower",))
     if not joint.lower <= joint.initial <= joint.upper:
@@ -114,17 +114,17 @@ def _check_limits(joint: Revolute | Prismatic, unit: str) -> None:
         raise rejected(f"{given}must be {between}", at=("initial",))
 
 
-Joint = Annotated[Fixed | Revolute | Continuous | Prismatic | Free, Field(discriminator="type")]
+Joint = Annotated[FixedPart | RevolutePart | ContinuousPart | PrismaticPart | FreePart, Field(discriminator="type")]
 
 
-class Link(Part):
+class LinkPart(Part):
     """A rigid part: what it hangs on, how it moves against that, and the shapes it carries."""
 
     parent: Name | None = None
     """The link that carries this one; without it the link is the root of a tree and stands in the world."""
     pose: Pose = Pose()
     """Where the joint stands in the parent's frame (or in the world)."""
-    joint: Joint = Fixed(type="fixed")
+    joint: Joint = FixedPart(type="fixed")
     """How the link moves in the joint's frame."""
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""

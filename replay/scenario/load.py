@@ -14,7 +14,7 @@ from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
 from replay.language.node import Node
 from replay.scenario.checks import check
-from replay.scenario.include import Text
+from replay.scenario.include import ScenarioText
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.names import Names
@@ -25,14 +25,14 @@ from replay.scenario.source import (
     Attached,
     Folder,
     Library,
-    Provenance,
     Remembered,
+    ScenarioProvenance,
     SourceRule,
     find,
     problem_at,
     resolve_name,
 )
-from replay.scenario.sweep import Sweep, SweepCase, cases, replaced
+from replay.scenario.sweep import SweepCase, SweepPart, cases, replaced
 from replay.scenario.yaml_text import parse
 
 VERSION = 1
@@ -124,7 +124,7 @@ class _File:
     def __init__(self, library: Library) -> None:
         self._library = library = Remembered(library)
         self._problems: list[Problem] = []
-        self._text = Text(library, self._problems)
+        self._text = ScenarioText(library, self._problems)
         root = self._text.read()
         if root is None:
             raise ScenarioError(self._problems)
@@ -157,7 +157,7 @@ class _File:
         if title is None or not isinstance(title.value, str) or title.value == name or sweep is None:
             return self.scenario()
         try:
-            Sweep.model_validate(sweep.data())
+            SweepPart.model_validate(sweep.data())
         except ValidationError:
             return self.scenario()  # which says what is wrong
         for case in cases(self._root, title.value):
@@ -181,7 +181,7 @@ class _File:
         if named:  # else names would be missed that are written, but not to be read
             found = itertools.islice(check(Names(root, scenario)), limits.PROBLEMS)
             problems.extend(problem_at(root, path, rule) for path, rule in found)
-        provenance = Provenance(main=self._library.main, sources=dict(self._text.sources), root=root)
+        provenance = ScenarioProvenance(main=self._library.main, sources=dict(self._text.sources), root=root)
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:
             raise ScenarioError(_in_order(problems))
@@ -196,7 +196,7 @@ class _File:
         return scenario
 
 
-def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenance) -> list[Problem]:
+def _read_meshes(library: Library, text: ScenarioText, root: Node, provenance: ScenarioProvenance) -> list[Problem]:
     """Read the files of all mesh shapes; a file is looked for relative to the file that names it."""
     problems = []
     links = root.child("links")
@@ -218,7 +218,7 @@ def _read_meshes(library: Library, text: Text, root: Node, provenance: Provenanc
     return problems
 
 
-def _read_log(library: Library, text: Text, root: Node, scenario: Scenario) -> list[Problem]:
+def _read_log(library: Library, text: ScenarioText, root: Node, scenario: Scenario) -> list[Problem]:
     """Read the log of recorded motion, which is looked for like a mesh, and what it says of the joints."""
     from replay.scenario.recorded import PATH, read
 

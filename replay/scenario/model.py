@@ -10,14 +10,14 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, mod
 
 from replay.language.fields import Name, Part, Text, Title, rejected
 from replay.language.units import Duration, Rate
-from replay.scenario.collision import Collision
+from replay.scenario.collision import CollisionPart
 from replay.scenario.expectations import Between, Expectation, PairExpectation
-from replay.scenario.links import Link
+from replay.scenario.links import LinkPart
 from replay.scenario.methods import Model, builtin_model
-from replay.scenario.motion import Motion
+from replay.scenario.motion import MotionPart
 from replay.scenario.sensors import Sensors
-from replay.scenario.source import Provenance
-from replay.scenario.sweep import Sweep
+from replay.scenario.source import ScenarioProvenance
+from replay.scenario.sweep import SweepPart
 
 MAX_FRAMES: Final = 100_000_000
 
@@ -29,11 +29,11 @@ class Fragment(Part):
 
     include: tuple[Annotated[str, StringConstraints(min_length=1)], ...] = ()
     """Files whose parts are merged in; paths relative to this file, inside the scenario's folder tree."""
-    links: dict[Name, Link] = Field(default_factory=dict)
+    links: dict[Name, LinkPart] = Field(default_factory=dict)
     """Links by name."""
-    motion: Motion = Motion()
+    motion: MotionPart = MotionPart()
     """What moves."""
-    collision: Collision = Collision()
+    collision: CollisionPart = CollisionPart()
     """What is tested for collision."""
     sensors: Sensors = Sensors()
     """Sensors."""
@@ -58,9 +58,9 @@ class Scenario(Fragment):
     """Frames per second [Hz]."""
     duration: Duration
     """Length [s]; frames are at k/rate for k = 0..floor(duration*rate)."""
-    sweep: Sweep | None = None
+    sweep: SweepPart | None = None
     """Cases that replace some values of this scenario."""
-    _provenance: Provenance = PrivateAttr(default_factory=Provenance)
+    _provenance: ScenarioProvenance = PrivateAttr(default_factory=ScenarioProvenance)
 
     @model_validator(mode="after")
     def _few_enough_frames(self) -> Self:
@@ -98,6 +98,6 @@ class Scenario(Fragment):
         return self._provenance.main
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> ScenarioProvenance:
         """Where everything was read."""
         return self._provenance

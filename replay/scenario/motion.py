@@ -22,7 +22,7 @@ SHORTEST = 1e-9
 """Shortest time between two points [s]: the resolution of recordings, and it keeps polynomials finite."""
 
 
-class Waypoint(Part):
+class WaypointPart(Part):
     """What a joint passes at one time; an interval is linear, cubic or quintic, as far as both its ends go."""
 
     time: Time
@@ -41,7 +41,7 @@ class Waypoint(Part):
         return self
 
 
-class Move(Part):
+class MovePart(Part):
     """A move from rest to rest by a trapezoidal velocity profile."""
 
     to: Annotated[dict[Name, JointPosition], Field(min_length=1)]
@@ -54,7 +54,7 @@ class Move(Part):
     """Whether all joints arrive together with the slowest."""
 
 
-class Keyframe(Placement):
+class KeyframePart(Placement):
     """Pose of a free link in its joint's frame at one time; between key frames position is linear, rotation slerp."""
 
     xyz: Vector
@@ -63,18 +63,18 @@ class Keyframe(Placement):
     """[s] from the scenario's start."""
 
 
-def _increasing(items: tuple[Waypoint | Keyframe, ...]) -> tuple[Waypoint | Keyframe, ...]:
+def _increasing(items: tuple[WaypointPart | KeyframePart, ...]) -> tuple[WaypointPart | KeyframePart, ...]:
     for index, (earlier, later) in enumerate(itertools.pairwise(items), start=1):
         if not later.time - earlier.time >= SHORTEST:
             raise rejected(f"must be above the one before, {earlier.time:.6g} s, by 1 ns or more", at=(index, "time"))
     return items
 
 
-Waypoints = Annotated[tuple[Waypoint, ...], Field(min_length=1), AfterValidator(_increasing)]
-Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_increasing)]
+Waypoints = Annotated[tuple[WaypointPart, ...], Field(min_length=1), AfterValidator(_increasing)]
+Keyframes = Annotated[tuple[KeyframePart, ...], Field(min_length=1), AfterValidator(_increasing)]
 
 
-class RecordedJoint(Part):
+class RecordedJointPart(Part):
     """The joint of a log that moves a joint of the scenario."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -83,7 +83,7 @@ class RecordedJoint(Part):
     """Unit of the positions in the log; when left out, the one in brackets in a CSV heading, or rad or m."""
 
 
-class RecordedFrame(Part):
+class RecordedFramePart(Part):
     """The frame of a log that moves a free link."""
 
     child: Annotated[str, Field(min_length=1)] | None = None
@@ -92,7 +92,7 @@ class RecordedFrame(Part):
     """The frame of the log that stands for the frame of the link's joint; may be left out if the log has one only."""
 
 
-class TimeColumn(Part):
+class TimeColumnPart(Part):
     """The times of a CSV file."""
 
     column: Annotated[str, Field(min_length=1)] | None = None
@@ -101,7 +101,7 @@ class TimeColumn(Part):
     """Its unit; when left out, the one in brackets in its heading, or s. Dates as of ISO 8601 have none."""
 
 
-class Recorded(Part):
+class RecordedPart(Part):
     """Joint positions from a log; between samples they are interpolated linearly, outside the ends hold.
 
     A continuous joint goes the short way round between two samples. What the log holds beyond the scenario's time does
@@ -117,15 +117,15 @@ class Recorded(Part):
     """The only channel (of a bag: connection or topic id) that is read of a topic: one of several publishers."""
     frame_id: str | None = None
     """The only frame_id that is read of joint states: one of several publishers on one channel."""
-    time: TimeColumn | None = None
+    time: TimeColumnPart | None = None
     """Column with the times of a .csv file; `time` in seconds when left out."""
     separator: Literal[",", ";", "\t", "|"] | None = None
     """What separates the cells of a .csv file; found in its headings when left out."""
     decimal: Literal[".", ","] | None = None
     """Decimal sign of a .csv file; found in its numbers when left out."""
-    joints: dict[Name, RecordedJoint] = Field(default_factory=dict)
+    joints: dict[Name, RecordedJointPart] = Field(default_factory=dict)
     """The log's joint by joint of the scenario; when left out, the joints that both have under the same name."""
-    free: dict[Name, RecordedFrame] = Field(default_factory=dict)
+    free: dict[Name, RecordedFramePart] = Field(default_factory=dict)
     """The log's frame by link with a free joint, from transforms (TF)."""
     limit_tolerance: LimitTolerance = Dimensioned(1e-4, None)
     """How far a measured position may be beyond a limit [rad or m], 1e-4 when left out; a note says so."""
@@ -135,14 +135,14 @@ class Recorded(Part):
     """Longest time [s] between two samples that is bridged in a straight line; a longer one is an error."""
 
 
-class Motion(Part):
+class MotionPart(Part):
     """What moves; all other joints hold their initial position."""
 
     points: dict[Name, Waypoints] = Field(default_factory=dict)
     """Waypoints by joint name."""
-    moves: tuple[Move, ...] = ()
+    moves: tuple[MovePart, ...] = ()
     """Moves, planned in this order."""
     free: dict[Name, Keyframes] = Field(default_factory=dict)
     """Pose key frames by the name of a free joint."""
-    recorded: Recorded | None = None
+    recorded: RecordedPart | None = None
     """Joint positions from a log."""

@@ -4,23 +4,23 @@ other entries are wrong, so that all problems are listed at once.
 
 from __future__ import annotations
 
-import fnmatch
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from replay.collision.globs import Globs
+from replay.collision.columns import MARGIN
 from replay.language.fields import Part
+from replay.language.globs import Globs, fits
 from replay.language.node import Node
 from replay.language.units import Distance
-from replay.scenario.collision import Disable
+from replay.scenario.collision import DisablePart
 from replay.scenario.expectations import Expectation
-from replay.scenario.links import Continuous, Joint, Prismatic, Revolute
+from replay.scenario.links import ContinuousPart, Joint, PrismaticPart, RevolutePart
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.model import Scenario
-from replay.scenario.motion import Keyframe, Keyframes, Move, Waypoint, Waypoints
+from replay.scenario.motion import KeyframePart, Keyframes, MovePart, WaypointPart, Waypoints
 from replay.scenario.source import find
 from replay.sensing.kinds import KINDS
 
@@ -29,7 +29,7 @@ SCALAR_JOINTS: Final = ("revolute", "continuous", "prismatic")
 
 def matches(pattern: str, link: str, shape: str | None = None) -> bool:
     """Return whether a pattern matches a link's name or, with a shape, "link/shape"."""
-    return fnmatch.fnmatchcase(link, pattern) or (shape is not None and fnmatch.fnmatchcase(f"{link}/{shape}", pattern))
+    return fits(link, pattern) or (shape is not None and fits(f"{link}/{shape}", pattern))
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class JointName:
     name: str
     link: str
     type: str | None
-    scalar: Revolute | Continuous | Prismatic | None
+    scalar: RevolutePart | ContinuousPart | PrismaticPart | None
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Names:
         if joint is None:
             return JointName(link, link, "fixed", None)
         valid = self._entry(Joint, "links", link, "joint")
-        scalar = valid if isinstance(valid, Revolute | Continuous | Prismatic) else None
+        scalar = valid if isinstance(valid, RevolutePart | ContinuousPart | PrismaticPart) else None
         return JointName(_text(joint.child("name")) or link, link, _text(joint.child("type")), scalar)
 
     @cached_property
@@ -120,17 +120,17 @@ class Names:
         return Globs([shape.link for shape in self.shapes]), Globs([shape.full for shape in self.shapes])
 
     @cached_property
-    def points(self) -> dict[str, tuple[Waypoint, ...] | None]:
+    def points(self) -> dict[str, tuple[WaypointPart, ...] | None]:
         """Waypoints by joint."""
         return {name: self._entry(Waypoints, "motion", "points", name) for name in self._map("motion", "points")}
 
     @cached_property
-    def moves(self) -> list[Move | None]:
+    def moves(self) -> list[MovePart | None]:
         """Moves in order."""
-        return [self._entry(Move, "motion", "moves", index) for index in self._list("motion", "moves")]
+        return [self._entry(MovePart, "motion", "moves", index) for index in self._list("motion", "moves")]
 
     @cached_property
-    def free(self) -> dict[str, tuple[Keyframe, ...] | None]:
+    def free(self) -> dict[str, tuple[KeyframePart, ...] | None]:
         """Key frames by joint."""
         return {name: self._entry(Keyframes, "motion", "free", name) for name in self._map("motion", "free")}
 
@@ -143,9 +143,9 @@ class Names:
         }
 
     @cached_property
-    def disable(self) -> list[Disable | None]:
+    def disable(self) -> list[DisablePart | None]:
         """Disabled pairs in order."""
-        return [self._entry(Disable, "collision", "disable", index) for index in self._list("collision", "disable")]
+        return [self._entry(DisablePart, "collision", "disable", index) for index in self._list("collision", "disable")]
 
     @cached_property
     def disabled(self) -> list[tuple[int, frozenset[str], frozenset[str]]]:
@@ -171,7 +171,7 @@ class Names:
     def margin(self) -> float | None:
         """collision.margin [m]."""
         if find(self.root, ("collision", "margin")) is None:
-            return 0.05
+            return MARGIN
         result: float | None = self._entry(Distance, "collision", "margin")
         return result
 

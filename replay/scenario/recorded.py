@@ -27,7 +27,7 @@ from replay.scenario.source import Library, SourceRule
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
-    from replay.scenario.motion import Recorded, RecordedFrame, RecordedJoint
+    from replay.scenario.motion import RecordedFramePart, RecordedJointPart, RecordedPart
 
 PATH = ("motion", "recorded")
 _TABLES = ("csv", "tsv")
@@ -36,7 +36,7 @@ _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
 
 
 @dataclass
-class Found:
+class RecordedMotion:
     """What a log says of a scenario's motion.
 
     Attributes:
@@ -56,7 +56,7 @@ class Found:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def read(scenario: Scenario, library: Library, name: str) -> Found:
+def read(scenario: Scenario, library: Library, name: str) -> RecordedMotion:
     """Return what the log of a scenario says.
 
     Args:
@@ -64,22 +64,22 @@ def read(scenario: Scenario, library: Library, name: str) -> Found:
         library: where its files are.
         name: of the log in the library: a file, or a ROS 2 bag's folder.
     """
-    return _Reader(scenario, library, name).found()
+    return _MotionReader(scenario, library, name).found()
 
 
-class _Reader:
+class _MotionReader:
     """Reads one scenario's log."""
 
     def __init__(self, scenario: Scenario, library: Library, name: str) -> None:
         assert scenario.motion.recorded is not None
         self._scenario = scenario
-        self._written: Recorded = scenario.motion.recorded
+        self._written: RecordedPart = scenario.motion.recorded
         self._library = library
         self._name = name
-        self._found = Found()
+        self._found = RecordedMotion()
         self._rows: set[int] = set()
 
-    def found(self) -> Found:
+    def found(self) -> RecordedMotion:
         """Return what it says."""
         found = self._found
         try:
@@ -177,9 +177,9 @@ class _Reader:
         end = begin + math.ceil(Fraction(self._scenario.duration) * 10**9)
         return Window(log.begin, begin, end, self._max_gap, log.published)
 
-    def _joints(self, log: JointLog) -> dict[str, RecordedJoint]:
+    def _joints(self, log: JointLog) -> dict[str, RecordedJointPart]:
         """Return the log's joint by joint of the scenario: as written, or those of the same name."""
-        from replay.scenario.motion import RecordedJoint
+        from replay.scenario.motion import RecordedJointPart
 
         if self._written.joints:
             return dict(self._written.joints)
@@ -188,7 +188,7 @@ class _Reader:
         for mine in self._scalar_joints():
             theirs = mine if mine in log.joints else exported.get(f"{mine} position", exported.get(mine, ""))
             if theirs and not self._scripted(mine):
-                common[mine] = RecordedJoint(name=theirs)
+                common[mine] = RecordedJointPart(name=theirs)
         if not common and not self._written.free:
             rule = f"has no joint of the scenario's names; it has {sorted(log.joints)}"
             raise Unusable((*PATH, "file"), f"{rule}: name them in motion.recorded.joints")
@@ -205,7 +205,7 @@ class _Reader:
             return "motion.points"
         return "motion.moves" if any(joint in move.to for move in motion.moves) else ""
 
-    def _track(self, joint: str, source: RecordedJoint, log: JointLog, window: Window) -> Track:
+    def _track(self, joint: str, source: RecordedJointPart, log: JointLog, window: Window) -> Track:
         path = (*PATH, "joints", joint)
         mine = self._scalar_joints()
         if joint not in mine:
@@ -255,7 +255,7 @@ class _Reader:
             self._note(path, f"{rule} = {value:.3g} {dimension.si}")
         return value
 
-    def _free_track(self, link: str, frame: RecordedFrame, log: JointLog, window: Window) -> tuple[str, FreeTrack]:
+    def _free_track(self, link: str, frame: RecordedFramePart, log: JointLog, window: Window) -> tuple[str, FreeTrack]:
         path = (*PATH, "free", link)
         joints = {name: part.joint for name, part in self._scenario.links.items() if part.joint.type == "free"}
         if link not in joints:

@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.logs.joint_log import Publisher, Series
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Flags, Floats, Integers
 
 APART = 1e-2
 """Least distance [rad or m] of two publishers' values that take turns: below, one encoder's noise looks the same."""
@@ -48,7 +46,7 @@ class Window:
     max_gap: int
     published: bool
 
-    def seconds(self, time: NDArray[np.int64]) -> Floats:
+    def seconds(self, time: Integers) -> Floats:
         """Return times of the log in seconds from the scenario's start, each rounded once."""
         seconds: Floats = (time - self.begin) / 1e9
         return seconds
@@ -97,7 +95,7 @@ def in_window(path: tuple[str | int, ...], series: Series, window: Window) -> Se
 _WAY_OUT = "channel and frame_id do not tell them apart: record one alone, or each on a topic of its own"
 
 
-def check_turns(path: tuple[str | int, ...], time: NDArray[np.int64], value: Floats) -> None:
+def check_turns(path: tuple[str | int, ...], time: Integers, value: Floats) -> None:
     """Refuse samples that two publishers give in turn: two smooth motions, apart from each other.
 
     Where one publisher's sample stands between two of the other's, it is off the line between them by far more than
@@ -171,5 +169,5 @@ def _value(value: np.ndarray) -> str:
     return " ".join(f"{number:.6g}" for number in np.atleast_1d(value))
 
 
-def _first(mask: NDArray[np.bool_]) -> int:
+def _first(mask: Flags) -> int:
     return int(np.flatnonzero(mask)[0])

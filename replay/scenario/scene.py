@@ -8,9 +8,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from replay.collision.pairs import CollisionBody, DisabledPair, Pair, plan_pairs
 from replay.errors import InvalidValue, MeshError, Problem, ScenarioError
 from replay.geometry import primitives
@@ -18,7 +15,9 @@ from replay.geometry.mesh import load_mesh
 from replay.geometry.solid import Solid
 from replay.kinematics.linkage import Linkage
 from replay.kinematics.motion import Script
+from replay.numerics.arrays import Floats, Integers
 from replay.scenario import frames, shapes
+from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.expectations import PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_model
@@ -27,7 +26,6 @@ from replay.scenario.model import Scenario
 from replay.scenario.names import matches
 from replay.scenario.notes import notes, piece_notes
 from replay.scenario.script import linkage, script
-from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.kinds import KINDS, of_kind
 from replay.sensing.target import Target, make_target
 
@@ -108,11 +106,11 @@ class Scene:
         """Clearances up to this one are computed [m] when the model says near."""
         return self.scenario.collision.margin
 
-    def time_ns(self, begin: int, end: int) -> NDArray[np.int64]:
+    def time_ns(self, begin: int, end: int) -> Integers:
         """Return the times (end - begin,) [ns] of frames begin..end-1."""
         return frames.time_ns(Fraction(self.scenario.rate), begin, end)
 
-    def seconds(self, begin: int, end: int) -> NDArray[np.float64]:
+    def seconds(self, begin: int, end: int) -> Floats:
         """Return the times (end - begin,) [s] of frames begin..end-1."""
         return frames.seconds(Fraction(self.scenario.rate), begin, end)
 
@@ -193,7 +191,7 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     problems: list[Problem] = []
     found = []
 
-    def mesh(link: str, name: str, shape: shapes.Mesh) -> Solid:
+    def mesh(link: str, name: str, shape: shapes.MeshPart) -> Solid:
         file = scenario.provenance.meshes.get((link, name))
         if file is None:
             raise MeshError(shape.file, "is not at hand: scenarios with meshes come from `load` or `load_sources`")
@@ -206,7 +204,7 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     for link, entry in scenario.links.items():
         for name, shape in entry.shapes.items():
             try:
-                solid = mesh(link, name, shape) if isinstance(shape, shapes.Mesh) else _primitive(shape)
+                solid = mesh(link, name, shape) if isinstance(shape, shapes.MeshPart) else _primitive(shape)
             except MeshError as error:
                 path = ("links", link, "shapes", name, "file")
                 problems.append(scenario.provenance.problem(path, f"cannot be used: {error.reason}"))
@@ -223,19 +221,19 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
 def _primitive(shape: shapes.ShapePart) -> Solid:
     """Return a shape that is no mesh, in its own frame."""
     match shape:
-        case shapes.Cube():
+        case shapes.CubePart():
             return primitives.cube(shape.size)
-        case shapes.Cuboid():
+        case shapes.CuboidPart():
             return primitives.cuboid(shape.size)
-        case shapes.Plane():
+        case shapes.PlanePart():
             return primitives.plane(shape.size)
-        case shapes.Sphere():
+        case shapes.SpherePart():
             return primitives.sphere(shape.radius, shape.chord_error)
-        case shapes.Cylinder():
+        case shapes.CylinderPart():
             return primitives.cylinder(shape.radius, shape.height, shape.chord_error)
-        case shapes.Cone():
+        case shapes.ConePart():
             return primitives.cone(shape.radius, shape.height, shape.chord_error)
-        case shapes.Arc():
+        case shapes.ArcPart():
             return primitives.arc(shape.radius, shape.span, shape.width, shape.thickness, shape.chord_error)
         case _:
             raise AssertionError(f"{type(shape).__name__} is no primitive shape")

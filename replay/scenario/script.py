@@ -15,8 +15,7 @@ from replay.language.units import Dimensioned
 from replay.numerics import transforms
 from replay.scenario import links
 from replay.scenario.model import Scenario
-from replay.scenario.motion import Keyframe as WrittenKeyframe
-from replay.scenario.motion import Waypoint as WrittenWaypoint
+from replay.scenario.motion import KeyframePart, WaypointPart
 
 
 def linkage(scenario: Scenario) -> Linkage:
@@ -71,10 +70,10 @@ def _where(scenario: Scenario, joint: str, time: float) -> tuple[str | int, ...]
     return ("motion", "points", joint, min(max(index, 0), len(points) - 1))
 
 
-def _link(name: str, link: links.Link) -> Link:
+def _link(name: str, link: links.LinkPart) -> Link:
     joint = link.joint
     result = Joint(joint.name or name, JointType(joint.type))
-    if isinstance(joint, links.Revolute | links.Continuous | links.Prismatic):
+    if isinstance(joint, links.RevolutePart | links.ContinuousPart | links.PrismaticPart):
         result = replace(
             result,
             axis=joint.axis,
@@ -82,12 +81,12 @@ def _link(name: str, link: links.Link) -> Link:
             acceleration=joint.acceleration,
             initial=joint.initial,
         )
-    if isinstance(joint, links.Revolute | links.Prismatic):
+    if isinstance(joint, links.RevolutePart | links.PrismaticPart):
         result = replace(result, lower=joint.lower, upper=joint.upper)
     return Link(name, link.parent, link.pose.transform(), result)
 
 
-def _waypoint(point: WrittenWaypoint) -> Waypoint:
+def _waypoint(point: WaypointPart) -> Waypoint:
     return Waypoint(point.time, point.position.value, _value(point.velocity), _value(point.acceleration))
 
 
@@ -95,6 +94,6 @@ def _value(quantity: Dimensioned | None) -> float | None:
     return None if quantity is None else quantity.value
 
 
-def _keyframe(key: WrittenKeyframe) -> Keyframe:
+def _keyframe(key: KeyframePart) -> Keyframe:
     x, y, z, w = (float(value) for value in transforms.to_quaternion(key.transform()))
     return Keyframe(key.time, key.xyz, (x, y, z, w))

@@ -35,7 +35,7 @@ class ShapePart(Part):
     """Whether sensors sense the shape."""
 
 
-class Cube(ShapePart):
+class CubePart(ShapePart):
     """A cube centred at its origin."""
 
     type: Literal["cube"]
@@ -43,7 +43,7 @@ class Cube(ShapePart):
     """Edge length [m]."""
 
 
-class Cuboid(ShapePart):
+class CuboidPart(ShapePart):
     """A box centred at its origin."""
 
     type: Literal["cuboid"]
@@ -51,7 +51,7 @@ class Cuboid(ShapePart):
     """Edge lengths along x, y and z [m]."""
 
 
-class Plane(ShapePart):
+class PlanePart(ShapePart):
     """A rectangle in its xy plane, centred at its origin, facing +z."""
 
     type: Literal["plane"]
@@ -59,7 +59,7 @@ class Plane(ShapePart):
     """Edge lengths along x and y [m]."""
 
 
-class Curved(ShapePart):
+class CurvedPart(ShapePart):
     """What all tessellated shapes have in common."""
 
     radius: Size
@@ -76,13 +76,13 @@ class Curved(ShapePart):
         return self
 
 
-class Sphere(Curved):
+class SpherePart(CurvedPart):
     """A sphere around its origin."""
 
     type: Literal["sphere"]
 
 
-class Cylinder(Curved):
+class CylinderPart(CurvedPart):
     """A cylinder along z, its origin at half height."""
 
     type: Literal["cylinder"]
@@ -90,7 +90,7 @@ class Cylinder(Curved):
     """Height [m]."""
 
 
-class Cone(Curved):
+class ConePart(CurvedPart):
     """A cone along z with its apex at +z, its origin at half height."""
 
     type: Literal["cone"]
@@ -98,7 +98,7 @@ class Cone(Curved):
     """Height [m]."""
 
 
-class Arc(Curved):
+class ArcPart(CurvedPart):
     """A bent bar in the xy plane, symmetric about +x: the C of a C-arm."""
 
     type: Literal["arc"]
@@ -116,7 +116,7 @@ class Arc(Curved):
         return self
 
 
-class Mesh(ShapePart):
+class MeshPart(ShapePart):
     """The triangles of a file."""
 
     type: Literal["mesh"]
@@ -126,4 +126,7 @@ class Mesh(ShapePart):
     """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres."""
 
 
-Shape = Annotated[Cube | Cuboid | Sphere | Cylinder | Cone | Plane | Arc | Mesh, Field(discriminator="type")]
+Shape = Annotated[
+    CubePart | CuboidPart | SpherePart | CylinderPart | ConePart | PlanePart | ArcPart | MeshPart,
+    Field(discriminator="type"),
+]

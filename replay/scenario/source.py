@@ -46,7 +46,7 @@ class Library(Protocol):
 
 
 @dataclass
-class Provenance:
+class ScenarioProvenance:
     """Where a scenario was read from.
 
     Attributes:

@@ -38,7 +38,7 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
 Path = tuple[str | int, ...]
 
 
-class Sweep(Part):
+class SweepPart(Part):
     """Cases of this scenario: each replaces some values, and is a scenario of its own, named by them."""
 
     grid: Annotated[dict[ValuePath, Annotated[tuple[Any, ...], Field(min_length=1)]], Field(min_length=1)] | None = None

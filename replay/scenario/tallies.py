@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import count
 from replay.language.fields import When
-
-Times = NDArray[np.int64]
-Values = NDArray[np.float64]
+from replay.numerics.arrays import Floats, Integers
 
 
 class Tally(Protocol):
     """Takes a quantity's values frame by frame and judges them in the end."""
 
-    def update(self, time_ns: Times, values: Values) -> None:
+    def update(self, time_ns: Integers, values: Floats) -> None:
         """Take the values (n,) of n frames at times (n,) [ns]; a NaN is no value."""
 
     def result(self, what: str) -> tuple[bool, str]:
@@ -36,7 +33,7 @@ class Count:
     first: int | None = None
     first_not: int | None = None
 
-    def update(self, time_ns: Times, values: Values) -> None:
+    def update(self, time_ns: Integers, values: Floats) -> None:
         """See `Tally`."""
         so = values > 0.0
         self.count += int(np.count_nonzero(so))
@@ -63,7 +60,7 @@ class Begin:
     window: tuple[int, int]
     first: int | None = None
 
-    def update(self, time_ns: Times, values: Values) -> None:
+    def update(self, time_ns: Integers, values: Floats) -> None:
         """See `Tally`."""
         so = values > 0.0
         if self.first is None and so.any():
@@ -92,7 +89,7 @@ class Extremes:
     most: tuple[float, int] = (-math.inf, 0)
     missing: int = 0
 
-    def update(self, time_ns: Times, values: Values) -> None:
+    def update(self, time_ns: Integers, values: Floats) -> None:
         """See `Tally`."""
         known = ~np.isnan(values)
         self.missing += len(values) - int(np.count_nonzero(known))

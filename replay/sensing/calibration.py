@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import CalibrationError, InvalidValue
+from replay.numerics.arrays import Floats
 from replay.sensing.robust_fit import robust_fit
 
-Floats = NDArray[np.float64]
 Quantity = Literal["capacitance", "delta_output"]
 
 QUANTITIES: tuple[Quantity, ...] = ("capacitance", "delta_output")

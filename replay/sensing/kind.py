@@ -12,17 +12,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
 from replay.language.fields import Part, rejected
+from replay.numerics.arrays import Floats
 from replay.numerics.columns import Columns
 
 if TYPE_CHECKING:
     from replay.kinematics.linkage import LinkPoses
     from replay.sensing.target import Target
 
-Floats = NDArray[np.float64]
 Color = tuple[int, int, int, int]
 """Red, green, blue and opacity, 0 to 255."""
 

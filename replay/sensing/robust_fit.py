@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import CalibrationError
-
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 SMALLEST_INDEPENDENCE = 1e-4
 """Two parameters whose effects on the curve agree to this part of the larger are not told apart: the model's integrals

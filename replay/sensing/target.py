@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import InvalidValue
 from replay.geometry.tree import Tree, triangle_tree
-
-Array = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +29,14 @@ class Target:
 
     name: str
     link: int
-    triangles: Array
+    triangles: Floats
     tree: Tree
-    closing: Array | None = None
+    closing: Floats | None = None
     earth: float = math.inf
 
 
 def make_target(
-    name: str, link: int, triangles: ArrayLike, *, closing: Array | None = None, earth: float = math.inf
+    name: str, link: int, triangles: ArrayLike, *, closing: Floats | None = None, earth: float = math.inf
 ) -> Target:
     """Return the target of a shape.
 

@@ -10,7 +10,7 @@ import psutil
 import pytest
 from distributed import Client
 
-from replay.batch.case import Status
+from replay.batch.case import CaseStatus
 from replay.batch.run import Execution, Unwatched, run_all
 from replay.cli.exit_codes import ExitCode
 from replay.errors import InvalidValue, WorkerError
@@ -43,9 +43,9 @@ def test_a_cluster_gives_the_same_even_when_a_worker_is_killed(cluster, tmp_path
     there = tmp_path / "there"
     run = run_all(scenarios, there, rrd=False, execution=Execution(dask=address, **limits), watch=Killer())
     statuses = {result.name: result.status for result in run.results}
-    assert statuses.pop("crash") is Status.CRASHED
-    assert statuses.pop("hang") is Status.TIMEOUT
-    assert set(statuses.values()) == {Status.PASSED}
+    assert statuses.pop("crash") is CaseStatus.CRASHED
+    assert statuses.pop("hang") is CaseStatus.TIMEOUT
+    assert set(statuses.values()) == {CaseStatus.PASSED}
     assert workers[0].wait() == -signal.SIGKILL
     assert "about to crash" in (there / "crash" / "log.txt").read_text()
     here = tmp_path / "here"
@@ -98,10 +98,10 @@ def test_an_interrupted_run_ends_its_processes_on_the_cluster(cluster, tmp_path,
     run = run_all(scenarios, tmp_path / "out", rrd=False, execution=Execution(dask=address), watch=Impatient())
     assert run.interrupted
     statuses = {result.name: result.status for result in run.results}
-    assert statuses.pop("hang") is Status.INTERRUPTED
+    assert statuses.pop("hang") is CaseStatus.INTERRUPTED
     assert sorted(statuses.items()) in (  # which of two equally long ones comes first is the scheduler's choice
-        [("good", Status.PASSED), ("good_1", Status.INTERRUPTED)],
-        [("good", Status.INTERRUPTED), ("good_1", Status.PASSED)],
+        [("good", CaseStatus.PASSED), ("good_1", CaseStatus.INTERRUPTED)],
+        [("good", CaseStatus.INTERRUPTED), ("good_1", CaseStatus.PASSED)],
     )
     end = time.monotonic() + 10.0
     while computing() != before and time.monotonic() < end:

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from replay.batch.baseline import LOG, Baseline, Entry
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.run import Execution, run_all
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
@@ -255,7 +255,7 @@ def test_files_of_a_run_are_never_written_through_links(tmp_path, link):
             target.unlink()
     before = listing(victim)
     (result,) = run_all([scenes.scene("a")], folder, overwrite=True, execution=Execution(workers=1)).results
-    assert result.status is Status.PASSED
+    assert result.status is CaseStatus.PASSED
     assert listing(victim) == before
     names = {path.name for path in (folder / "a").iterdir() if path.is_file() and not path.is_symlink()}
     assert names >= {"log.txt", "result.json", "a.mcap", "a.rrd"}
@@ -271,9 +271,9 @@ def test_the_folder_of_a_scenario_that_is_a_link_is_its_error(tmp_path):
     for name in ("a", "invalid"):
         (folder / name).symlink_to(victim)
     before = listing(victim)
-    failed = [CaseResult("invalid", Status.FAILED, error="not valid", invalid=True)]
+    failed = [CaseResult("invalid", CaseStatus.FAILED, error="not valid", invalid=True)]
     done = run_all([scenes.scene("a")], folder, rrd=False, overwrite=True, failed=failed)
-    assert [result.status for result in done.results] == [Status.FAILED] * 2
+    assert [result.status for result in done.results] == [CaseStatus.FAILED] * 2
     assert done.results[0].error.startswith(f"{folder / 'a'}: cannot be written: it is a link")
     assert listing(victim) == before
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from replay.batch.case import Status
+from replay.batch.case import CaseStatus
 from replay.batch.cost import expected_cost
 from replay.batch.prepare import needs_of
 from replay.batch.run import Execution, Unwatched, run_all
@@ -63,11 +63,11 @@ def test_failures_are_told_apart_and_the_others_are_recorded(tmp_path, monkeypat
     limits = Execution(workers=2, timeout=3.0, memory=600 << 20)
     run = run_all(scenarios, tmp_path, rrd=False, overwrite=True, execution=limits)
     assert {result.name: result.status for result in run.results} == {
-        "good": Status.PASSED,
-        "crash": Status.CRASHED,
-        "hang": Status.TIMEOUT,
-        "eat": Status.MEMORY,
-        "broken": Status.BROKEN,
+        "good": CaseStatus.PASSED,
+        "crash": CaseStatus.CRASHED,
+        "hang": CaseStatus.TIMEOUT,
+        "eat": CaseStatus.MEMORY,
+        "broken": CaseStatus.BROKEN,
     }
     assert not run.passed
     assert (tmp_path / "crash" / "log.txt").read_text().splitlines()[:2] == ["about to crash", "crash: crashed"]
@@ -172,7 +172,7 @@ def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
     (tmp_path / "bad").write_text("where its folder should be")
     run = run_all([scenes.scene("bad"), scenes.scene("good")], tmp_path, rrd=False, execution=TWO)
     bad, good = run.results
-    assert (bad.status, good.status) == (Status.FAILED, Status.PASSED)
+    assert (bad.status, good.status) == (CaseStatus.FAILED, CaseStatus.PASSED)
     assert (
         bad.error
         == f"{tmp_path / 'bad' / 'log.txt'}: cannot be written: {tmp_path / 'bad'} is a file where a folder is needed"
@@ -180,7 +180,7 @@ def test_a_folder_that_cannot_be_written_is_the_error_of_its_scenario(tmp_path):
     (tmp_path / "good" / "result.json").unlink()
     (tmp_path / "good" / "result.json").mkdir()
     (again,) = run_all([scenes.scene("good")], tmp_path, rrd=False, overwrite=True, execution=TWO).results
-    assert (again.status, again.recordings) == (Status.FAILED, None)
+    assert (again.status, again.recordings) == (CaseStatus.FAILED, None)
 
 
 def test_a_full_disk_ends_the_run_and_leaves_no_whole_run(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 from replay.bench import goals, results
 from replay.bench.goals import PROMISES, Goal, advantage
 from replay.bench.measure import Check, Contender, absent, compete, exponent
-from replay.bench.report import Grid, Plot, Report, pareto_front, pareto_plot
+from replay.bench.report import Grid, LogLogPlot, Report, pareto_front, pareto_plot
 
 
 def contender(name, *, answer=1.0, work=0):
@@ -89,7 +89,9 @@ def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
         grids={"grid": Grid([{"a": 1, "b": "x"}])},
         goals=[Goal("cone.speed", math.nan), Goal("gjk.fcl", 4.0)],
         plots=[
-            Plot("cost", "n", "s", {"ours": [(1.0, 0.0), (10.0, 1e-3)]}, joined=True, front=True, crossed=[(1.0, 0.0)]),
+            LogLogPlot(
+                "cost", "n", "s", {"ours": [(1.0, 0.0), (10.0, 1e-3)]}, joined=True, front=True, crossed=[(1.0, 0.0)]
+            ),
             pareto_plot("empty", [], "error", headline=True),
         ],
         notes=["a note"],

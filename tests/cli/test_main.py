@@ -1,7 +1,9 @@
 """What all commands share: usage errors, exit codes, what is loaded, output that cannot be written."""
 
+import os
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,8 @@ import replay.batch.run
 import replay.batch.select
 from replay.cli.exit_codes import ExitCode, worst
 from replay.cli.main import run
+
+ROOT = Path(replay.__file__).parents[1]
 
 
 @pytest.mark.parametrize(
@@ -76,3 +80,20 @@ def test_a_fault_of_the_program_never_looks_like_a_difference(scenario, monkeypa
     monkeypatch.setattr(replay.batch.select, "load_all", broken)
     assert run(["validate", str(scenario)]) is ExitCode.FAILED
     assert "fault of replay: RuntimeError: unforeseen" in capsys.readouterr().err
+
+
+def test_an_interrupt_that_passed_through_an_exec_changes_no_exit_code(tmp_path):
+    """Python remembers it, and `python -m` would kill itself by SIGINT instead of leaving with its code."""
+    module = """
+        from replay.cli.main import main
+        try:
+            exec("raise KeyboardInterrupt")
+        except KeyboardInterrupt:
+            pass
+        main(["--version"])
+    """
+    (tmp_path / "interrupted.py").write_text(textwrap.dedent(module))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "interrupted"]
+    left = subprocess.run(command, check=False, cwd=tmp_path, env=environment, capture_output=True)
+    assert left.returncode == 0

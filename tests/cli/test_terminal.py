@@ -14,7 +14,7 @@ import pytest
 from mcap.writer import Writer
 
 import replay
-from replay.batch.case import CaseResult, Status
+from replay.batch.case import CaseResult, CaseStatus
 from replay.cli import terminal
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
@@ -95,7 +95,7 @@ def test_bars_move_and_names_in_them_do_not(monkeypatch):
         progress.follow(EVIL, 0, 0)
         progress.tell(EVIL)
         progress.compare(EVIL)
-        progress.done(CaseResult(EVIL, Status.CRASHED, error=EVIL))
+        progress.done(CaseResult(EVIL, CaseStatus.CRASHED, error=EVIL))
     assert "\x1b[" in screen.getvalue()  # the bars' own
     assert SHOWN in screen.getvalue()
     for part in ("\x1b]0", "\x07", "\x1b[2J", "\x9b", "\u202e", "\nreplay: passed", "\x08"):

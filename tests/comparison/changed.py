@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from replay.comparison.runs import Case, Pair, RunDifference, diff_pair
+from replay.comparison.runs import Case, RecordingPair, RunDifference, diff_pair
 from replay.recording.provenance import sha256
 from tests.comparison import made_up
 
@@ -31,6 +31,6 @@ CANDIDATE = made_up.with_provenance(
 
 
 def compared(name="made_up", rules=None):
-    pair = Pair(BASELINE, CANDIDATE)
+    pair = RecordingPair(BASELINE, CANDIDATE)
     case = Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(pair, rules=rules))
     return RunDifference("a.mcap", "b.mcap", (case,)), pair

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replay.collision.columns import CollisionColumns
-from replay.comparison.events import Track, _least_shift, match, tracks
+from replay.comparison.events import StateTrack, _least_shift, match, tracks
 from replay.sensing.distance.columns import DistanceColumns
 
 LEVEL = CollisionColumns.fields()[0]
@@ -16,7 +16,7 @@ ascending = st.lists(st.integers(0, 60), unique=True, max_size=6).map(sorted)
 
 
 def track(a, b):
-    return Track(np.array(a, dtype=np.int64), np.array(b, dtype=np.int64), 0, {None: "{}"})
+    return StateTrack(np.array(a, dtype=np.int64), np.array(b, dtype=np.int64), 0, {None: "{}"})
 
 
 def events(a, b):

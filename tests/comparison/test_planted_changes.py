@@ -7,7 +7,7 @@ import pytest
 
 import replay
 from replay.comparison.diff import FRAMES, compare
-from replay.comparison.difference import Fate, Verdict
+from replay.comparison.difference import DiffVerdict, Fate
 from replay.comparison.rules import Rule, Rules, Tolerance
 from tests.comparison import made_up
 from tests.comparison.made_up import altered, only_frames, with_names, with_provenance
@@ -23,7 +23,7 @@ def rules(pattern, **tolerance):
 def changed(change, **options):
     """Return the difference, whose verdict must be "different" and whose only finding is one signal."""
     found = compare(BASELINE, altered(BASELINE, change), **options)
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     assert not (found.missing or found.extra or found.scene or found.provenance or found.frames.missing)
     (signal,) = found.signals
     return signal
@@ -32,7 +32,7 @@ def changed(change, **options):
 def test_a_run_equals_itself_and_its_copy():
     for other in (BASELINE, made_up.recording()):
         found = compare(BASELINE, other)
-        assert found.verdict is Verdict.SAME
+        assert found.verdict is DiffVerdict.SAME
         assert found.signals == found.missing == found.extra == found.scene == found.provenance == ()
         assert (found.frames.matched, found.compared) == (100, 2 * 2 + 4 * 2 + 4 * 2 + 14 * 2 + 7)
 
@@ -80,7 +80,7 @@ def test_a_missing_topic_is_named_with_all_its_signals():
     (absence,) = compare(without, BASELINE).extra
     assert absence.label == "topic /collision"
     ignored = compare(BASELINE, without, rules=rules("/collision/*", ignore=True))
-    assert ignored.verdict is Verdict.SAME
+    assert ignored.verdict is DiffVerdict.SAME
     assert [item.decides for item in ignored.missing] == [False]
 
 
@@ -98,7 +98,7 @@ def test_an_extra_pair_is_named_and_the_others_are_matched_by_name():
     assert found.signals == found.missing == ()
     (absence,) = found.extra
     assert (absence.topic, absence.name, len(absence.signals)) == ("/collision", "arm/beam|floor/slab", 4)
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
 
 
 def test_a_renamed_sensor_is_recognised_by_its_readings():
@@ -111,7 +111,7 @@ def test_a_renamed_sensor_is_recognised_by_its_readings():
     assert (lost.label, lost.same_as) == ("topic /distance/left", ("/distance/links", ""))
     assert (new.label, new.same_as) == ("topic /distance/links", ("/distance/left", ""))
     assert found.signals == ()
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
 
 
 def test_a_renamed_pair_is_recognised_and_equal_readings_of_several_are_not_guessed():
@@ -138,12 +138,12 @@ def test_a_shifted_contact_is_one_event(begin, end):
     assert (event.baseline.frame, event.candidate.frame) == ((40, begin) if begin != 40 else (60, end))
     assert event.shift == pytest.approx((begin - 40 + end - 60) / made_up.RATE, abs=2e-9)
     allowed = compare(BASELINE, altered(BASELINE, shift), rules=rules("*/level/*", frames=frames))
-    assert allowed.verdict is Verdict.SAME
+    assert allowed.verdict is DiffVerdict.SAME
     assert allowed.accepted[0].events[0].allowed
     less = rules("*/level/*", time=0.9 * frames / made_up.RATE)
-    assert compare(BASELINE, altered(BASELINE, shift), rules=less).verdict is Verdict.DIFFERENT
+    assert compare(BASELINE, altered(BASELINE, shift), rules=less).verdict is DiffVerdict.DIFFERENT
     more = rules("*/level/*", time=frames / made_up.RATE)
-    assert compare(BASELINE, altered(BASELINE, shift), rules=more).verdict is Verdict.SAME
+    assert compare(BASELINE, altered(BASELINE, shift), rules=more).verdict is DiffVerdict.SAME
 
 
 def test_a_contact_that_vanishes_or_appears_is_never_a_shift():
@@ -226,7 +226,7 @@ def test_the_other_quaternion_of_the_same_rotation_is_equal():
     def negate(recording):
         recording.link_quaternions[:, 0] *= -1.0
 
-    assert compare(BASELINE, altered(BASELINE, negate)).verdict is Verdict.SAME
+    assert compare(BASELINE, altered(BASELINE, negate)).verdict is DiffVerdict.SAME
 
 
 def test_a_rotation_is_compared_by_its_angle():
@@ -238,8 +238,8 @@ def test_a_rotation_is_compared_by_its_angle():
     signal = changed(turn)
     assert signal.signal.full_name == "/tf/rotation/stand"
     assert signal.worst_abs.error == pytest.approx(1e-9, rel=1e-6)
-    assert compare(BASELINE, altered(BASELINE, turn), rules=rules("*", abs=1.01e-9)).verdict is Verdict.SAME
-    assert compare(BASELINE, altered(BASELINE, turn), rules=rules("*", abs=0.99e-9)).verdict is Verdict.DIFFERENT
+    assert compare(BASELINE, altered(BASELINE, turn), rules=rules("*", abs=1.01e-9)).verdict is DiffVerdict.SAME
+    assert compare(BASELINE, altered(BASELINE, turn), rules=rules("*", abs=0.99e-9)).verdict is DiffVerdict.DIFFERENT
 
 
 def test_another_mesh_is_a_change_of_the_scene():
@@ -247,9 +247,9 @@ def test_another_mesh_is_a_change_of_the_scene():
     found = compare(BASELINE, with_provenance(BASELINE, files=files))
     (change,) = found.scene
     assert (change.name, change.candidate) == ("/files/meshes/beam.stl", f"sha256 {'f' * 64}")
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     accepted = compare(BASELINE, with_provenance(BASELINE, files=files), rules=rules("/files/*", ignore=True))
-    assert accepted.verdict is Verdict.SAME
+    assert accepted.verdict is DiffVerdict.SAME
 
 
 def test_library_versions_and_models_are_named_and_leave_the_verdict():
@@ -261,14 +261,14 @@ def test_library_versions_and_models_are_named_and_leave_the_verdict():
         files={**BASELINE.provenance.files, "run.yaml": "e" * 64},
     )
     found = compare(BASELINE, other)
-    assert found.verdict is Verdict.SAME
+    assert found.verdict is DiffVerdict.SAME
     assert {change.name: change.candidate for change in found.provenance} == {
         "model.capacitive": "midpoint@1",
         "code": "0" * 64,
         "libraries.numpy": "9.9",
         "/files/run.yaml": f"sha256 {'e' * 64}",
     }
-    assert compare(BASELINE, other, strict_provenance=True).verdict is Verdict.DIFFERENT
+    assert compare(BASELINE, other, strict_provenance=True).verdict is DiffVerdict.DIFFERENT
 
 
 def test_a_joint_of_another_unit_is_a_change():
@@ -285,8 +285,8 @@ def test_frames_are_matched_by_time_and_the_others_counted():
     assert (frames.matched, frames.missing, frames.extra) == (98, 2, 3)
     assert (frames.first_missing.frame, frames.first_extra.frame) == (7, 98)
     assert frames.first_extra.time == candidate.time[98] / 1e9
-    assert found.verdict is Verdict.DIFFERENT
-    assert compare(BASELINE, candidate, rules=rules(FRAMES, ignore=True)).verdict is Verdict.SAME
+    assert found.verdict is DiffVerdict.DIFFERENT
+    assert compare(BASELINE, candidate, rules=rules(FRAMES, ignore=True)).verdict is DiffVerdict.SAME
 
 
 def test_no_frame_in_common_is_said():
@@ -335,13 +335,13 @@ def test_every_difference_is_reported_and_not_only_the_first():
 
 def test_public_diff_takes_recordings_and_files(tmp_path):
     baseline = made_up.write(BASELINE, tmp_path / "a.mcap")
-    assert replay.diff(baseline, str(baseline)).verdict is Verdict.SAME
+    assert replay.diff(baseline, str(baseline)).verdict is DiffVerdict.SAME
     assert replay.diff(BASELINE, baseline).signals == ()
     same_readings = with_provenance(BASELINE, libraries={"numpy": "9.9"})
     found = replay.diff(baseline, made_up.write(same_readings, tmp_path / "b.mcap"))
-    assert found.verdict is Verdict.SAME
+    assert found.verdict is DiffVerdict.SAME
     assert found.provenance
     assert found.compared == 55
     grown = replay.diff(baseline, made_up.write(BASELINE, tmp_path / "c.mcap", size=1.5))
     assert [change.name for change in grown.scene] == ["/scene/arm/beam", "/scene/stand/base", "/scene/stand/column"]
-    assert grown.verdict is Verdict.DIFFERENT
+    assert grown.verdict is DiffVerdict.DIFFERENT

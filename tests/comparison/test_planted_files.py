@@ -13,7 +13,7 @@ import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.comparison import wording
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.runs import read_pair
 from replay.recording.reader import read
@@ -150,7 +150,7 @@ def test_topics_of_the_same_bytes_are_not_read(tmp_path):
     none_may_be_nan = Rules((Rule(("/distance/corner_foot_left/*",), Tolerance(nan="fail"), "it always sees"),))
     found = replay.diff(PARKING, target, rules=none_may_be_nan)
     assert {item.signal.topic for item in found.signals} == {CORNER, "/distance/corner_foot_left"}
-    assert replay.diff(PARKING, PARKING, rules=none_may_be_nan).verdict is Verdict.DIFFERENT
+    assert replay.diff(PARKING, PARKING, rules=none_may_be_nan).verdict is DiffVerdict.DIFFERENT
 
 
 def test_a_negative_zero_is_equal_unless_it_may_not_be(tmp_path, capsys):

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pytest
 from rerun.chunk import RrdReader
 
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.outputs import Outputs
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Curves, plots
@@ -19,7 +19,7 @@ from replay.comparison.report_html import html
 from replay.comparison.report_junit import junit
 from replay.comparison.report_text import text
 from replay.comparison.rules import Rule, Rules, Tolerance
-from replay.comparison.runs import Case, Pair, RunDifference, diff_pair, diff_runs
+from replay.comparison.runs import Case, RecordingPair, RunDifference, diff_pair, diff_runs
 from replay.comparison.wording import summary
 from replay.errors import InvalidValue, RecordingError, WriteError
 from tests.comparison import made_up
@@ -75,7 +75,7 @@ def test_verbose_text_lists_what_the_rules_accept_and_why():
 
 def test_text_tells_the_provenance_of_a_night_once():
     found, _ = compared()
-    other = Pair(
+    other = RecordingPair(
         BASELINE, made_up.with_provenance(CANDIDATE, libraries={**BASELINE.provenance.libraries, "numpy": "8.8"})
     )
     last = Case("last", Path("a.mcap"), Path("b.mcap"), diff_pair(other, rules=None))
@@ -91,16 +91,19 @@ def test_text_tells_the_provenance_of_a_night_once():
 def test_what_rules_accept_is_called_ignored_in_the_line_of_a_scenario():
     shorter = dataclasses.replace(made_up.only_frames(BASELINE, np.arange(99)), collision=None)
     accepted = Rules((Rule(("/collision/*", "/frames"), Tolerance(ignore=True), "known"),))
-    assert summary(diff_pair(Pair(BASELINE, shorter), rules=accepted)) == (
+    assert summary(diff_pair(RecordingPair(BASELINE, shorter), rules=accepted)) == (
         "1 frame in one run only (ignored), 8 signals missing (ignored)"
     )
-    assert summary(diff_pair(Pair(BASELINE, shorter), rules=None)) == "1 frame in one run only, 8 signals missing"
+    assert (
+        summary(diff_pair(RecordingPair(BASELINE, shorter), rules=None)) == "1 frame in one run only, 8 signals missing"
+    )
 
 
 def test_what_differs_is_not_lost_among_what_is_the_same():
     numpy = made_up.with_provenance(BASELINE, libraries={**BASELINE.provenance.libraries, "numpy": "9.9"})
     same = [
-        Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(Pair(BASELINE, numpy), rules=None)) for name in ("a", "b")
+        Case(name, Path("a.mcap"), Path("b.mcap"), diff_pair(RecordingPair(BASELINE, numpy), rules=None))
+        for name in ("a", "b")
     ]
     (different,) = compared(name="c")[0].cases
     found = RunDifference("a", "b", (*same, different))
@@ -197,7 +200,7 @@ def test_drawings_keep_peaks_and_gaps_of_long_signals():
         recording.capacitive.capacitance[7, 0] = np.inf
         recording.joint_velocities[9, 0] = 1.7e308
 
-    pair = Pair(long, made_up.altered(long, spike))
+    pair = RecordingPair(long, made_up.altered(long, spike))
     drawn = {plot.signal: plot for plot in plots(diff_pair(pair, rules=None), pair)}
     assert len(drawn) == 4
     position = drawn["/joint_states/position/lift"]
@@ -213,7 +216,7 @@ def test_run_folders_correspond_by_scenario(folders):
     found = diff_runs(folders / "a", folders / "b", visit=lambda case, pair: seen.append(case.name))
     assert (found.missing, found.extra, seen) == (("gone",), ("new",), ["other", "same"])
     assert [case.name for case in found.different] == ["other"]
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     assert text(found).endswith("different: 1 of 2 scenarios differ, 1 missing, 1 extra\n")
     with pytest.raises(InvalidValue, match="must be a folder"):
         diff_runs(folders / "a", folders / "b" / "same" / "same.mcap")

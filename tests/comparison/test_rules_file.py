@@ -8,11 +8,12 @@ import pytest
 
 from replay.comparison import rules_file, wording
 from replay.comparison.diff import compare
-from replay.comparison.difference import Verdict
-from replay.comparison.rules import EXACT, Rule, Tolerance, literal_pattern
+from replay.comparison.difference import DiffVerdict
+from replay.comparison.rules import EXACT, Rule, Tolerance
 from replay.comparison.rules_file import read_rules, schema_text
 from replay.comparison.signals import groups
 from replay.errors import InvalidValue, ScenarioError
+from replay.language.globs import literal_glob
 from replay.scenario.yaml_text import parse
 from tests.comparison import made_up
 
@@ -74,9 +75,9 @@ rules:
     candidate = made_up.altered(baseline, change)
     path = written(tmp_path, text)
     found = compare(baseline, candidate, rules=read_rules(path, today=TODAY))
-    assert (found.verdict, found.expired) == (Verdict.SAME, ())
+    assert (found.verdict, found.expired) == (DiffVerdict.SAME, ())
     found = compare(baseline, candidate, rules=read_rules(path, today=TODAY + datetime.timedelta(days=1)))
-    assert found.verdict is Verdict.DIFFERENT
+    assert found.verdict is DiffVerdict.DIFFERENT
     assert [rule.reason for rule in found.expired] == ["known"]
     with pytest.raises(InvalidValue, match="today"):
         read_rules(path)
@@ -96,7 +97,7 @@ rules:
         recording.link_poses[5:9, 0, 2, 3] += 0.1
 
     found = compare(baseline, made_up.altered(baseline, move), rules=rules)
-    assert found.verdict is Verdict.SAME
+    assert found.verdict is DiffVerdict.SAME
     (item,) = found.accepted
     assert (item.signal.full_name, item.frames, item.decides) == ("/tf/translation.z/arm", 4, False)
     told = f"rule ignored ({path}:4:14), until 2027-03-31: new bearing (https://example.org/7)"
@@ -172,14 +173,14 @@ def test_shipped_rules_give_every_signal_a_tolerance_with_a_reason():
         recording.distance.distance[50, 0] += 1e-6
 
     nearly = made_up.altered(baseline, last_digits)
-    assert compare(baseline, nearly, rules=rules).verdict is Verdict.SAME
-    assert compare(baseline, nearly).verdict is Verdict.DIFFERENT
-    assert compare(baseline, made_up.altered(baseline, more), rules=rules).verdict is Verdict.DIFFERENT
+    assert compare(baseline, nearly, rules=rules).verdict is DiffVerdict.SAME
+    assert compare(baseline, nearly).verdict is DiffVerdict.DIFFERENT
+    assert compare(baseline, made_up.altered(baseline, more), rules=rules).verdict is DiffVerdict.DIFFERENT
 
 
-def test_a_literal_pattern_matches_its_name_alone():
+def test_a_literal_glob_matches_its_name_alone():
     name = "/distance/what[1]*?/distance"
-    exact = Rule((literal_pattern(name),), EXACT, "r")
+    exact = Rule((literal_glob(name),), EXACT, "r")
     assert exact.matches(name)
     assert not exact.matches("/distance/what1ab/distance")
 

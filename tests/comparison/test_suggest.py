@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.rules_file import read_rules
-from replay.comparison.runs import Case, Pair, RunDifference, diff_pair
+from replay.comparison.runs import Case, RecordingPair, RunDifference, diff_pair
 from replay.comparison.suggest import MARK, round_up, suggest
 from tests.comparison import made_up
 from tests.comparison.changed import BASELINE, change, compared
@@ -34,19 +34,19 @@ def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
         change(recording)
         recording.distance.distance[20, 0] = BASELINE.distance.distance[20, 0]
 
-    pair = Pair(BASELINE, made_up.altered(BASELINE, calm))
+    pair = RecordingPair(BASELINE, made_up.altered(BASELINE, calm))
     found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=None)),))
     path = tmp_path / "rules.yaml"
     path.write_text(suggest(found), encoding="utf-8")
     rules = read_rules(path)
     assert len(rules.active) == 4  # both state signals need two frames and share a rule
     assert all(rule.reason.startswith(MARK) for rule in rules.active)
-    assert diff_pair(pair, rules=rules).verdict is Verdict.SAME
+    assert diff_pair(pair, rules=rules).verdict is DiffVerdict.SAME
     for k, rule in enumerate(rules.active):
         tolerance = rule.tolerance
         tighter = Tolerance(abs=tolerance.abs * 0.9, frames=max(0, tolerance.frames - 1))
         others = [*rules.active[:k], Rule(rule.signals, tighter, "tighter"), *rules.active[k + 1 :]]
-        assert diff_pair(pair, rules=Rules(tuple(others))).verdict is Verdict.DIFFERENT
+        assert diff_pair(pair, rules=Rules(tuple(others))).verdict is DiffVerdict.DIFFERENT
 
 
 def test_what_no_tolerance_accepts_is_a_comment(tmp_path):

@@ -18,7 +18,9 @@ from types import FrameType
 import replay
 
 LONGEST = 20.0
-"""Longest time [s] of one input."""
+"""Longest processor time [s] of one input: what others do on the machine does not count."""
+STILL = 300.0
+"""Longest time [s] of one input that waits for something."""
 MOST = 2 << 30
 """Most resident memory [bytes] of the process."""
 _OWN = (
@@ -56,7 +58,7 @@ class Hang(BaseException):
 
 
 def _late(signum: int, frame: FrameType | None) -> None:
-    raise Hang(f"longer than {LONGEST:g} s")
+    raise Hang(f"longer than {LONGEST:g} s of work" if signum == signal.SIGPROF else f"longer than {STILL:g} s")
 
 
 def install() -> None:
@@ -69,19 +71,22 @@ def install() -> None:
 @contextlib.contextmanager
 def watched() -> Iterator[None]:
     """Raise AssertionError for what was opened inside, Hang for what takes too long, MemoryError for what grows."""
-    before = signal.signal(signal.SIGALRM, _late)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
-    begin, peak = time.monotonic(), _peak()
+    before = [signal.signal(number, _late) for number in (signal.SIGPROF, signal.SIGALRM)]
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
+    signal.setitimer(signal.ITIMER_REAL, STILL)
+    begin, peak = time.process_time(), _peak()
     _foreign.clear()
     _watching.append(True)
     try:
         yield
     finally:
         _watching.clear()
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        for number, handler in zip((signal.SIGPROF, signal.SIGALRM), before, strict=True):
+            signal.signal(number, handler)
     assert not _foreign, f"opened: {_foreign}"
-    assert time.monotonic() - begin < LONGEST, "took too long in native code"
+    assert time.process_time() - begin < LONGEST, "took too long in native code"
     assert _peak() < MOST or _peak() == peak, f"memory rose to {_peak() / 2**20:.0f} MiB"
 
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from replay.logs.ros_schema import Field, long_name, types_of
+from replay.logs.ros_schema import RosField, long_name, types_of
 from replay.logs.ros_wire import decode_cdr, decode_ros1
 from tests.logs import made_logs
 from tests.logs.made_logs import ROS, Said
@@ -21,7 +21,7 @@ def test_every_base_type_is_read_in_both_orders_and_all_alignments():
     rng = np.random.default_rng(0)
     for _ in range(50):
         names = [str(name) for name in rng.choice([*kinds], 12)]
-        types = {"a/msg/A": tuple(Field(f"f{k}", name, 1, False) for k, name in enumerate(names))}
+        types = {"a/msg/A": tuple(RosField(f"f{k}", name, 1, False) for k, name in enumerate(names))}
         for order in "<>":
             for kind, align in ((b"\0" + bytes([order == "<"]), 8), (b"\0" + bytes([6 + (order == "<")]), 4)):
                 wire = made_logs.Wire(order=order, align=align)
@@ -71,7 +71,7 @@ def test_any_other_bytes_are_no_message_or_one_within_bounds(kind):
 
 
 def test_a_definition_that_holds_much_of_nothing_ends():
-    types = {f"a/msg/T{k}": tuple(Field(f"f{n}", f"a/msg/T{k + 1}", 1, False) for n in range(50)) for k in range(12)}
+    types = {f"a/msg/T{k}": tuple(RosField(f"f{n}", f"a/msg/T{k + 1}", 1, False) for n in range(50)) for k in range(12)}
     types["a/msg/T12"] = ()
     begin = time.monotonic()
     with pytest.raises(ValueError, match="too much of nothing"):

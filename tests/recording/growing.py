@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 
 from replay.comparison.overlay import write_overlay
-from replay.comparison.runs import Case, Pair, diff_pair
+from replay.comparison.runs import Case, RecordingPair, diff_pair
 from replay.recording.record import record_blocks
 from replay.recording.rerun_log import RerunWriter
 from replay.recording.side_by_side import write_side_by_side
@@ -52,7 +52,7 @@ def overlays(folder):
     from replay.recording.reader import read
 
     while True:
-        pair = Pair(read(paths[0]), read(paths[1]))
+        pair = RecordingPair(read(paths[0]), read(paths[1]))
         write_overlay(folder / "a.rrd", Case("a", *paths, diff_pair(pair, rules=None)), pair)
         yield
 

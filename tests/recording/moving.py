@@ -8,7 +8,8 @@ import numpy as np
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
-from replay.recording.scene_view import BodyView, Floats, SceneView
+from replay.numerics.arrays import Floats
+from replay.recording.scene_view import BodyView, SceneView
 from replay.sensing.capacitive import CapacitiveSensor, Plate
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.distance import DistanceSensor

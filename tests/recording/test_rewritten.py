@@ -10,7 +10,7 @@ from mcap.writer import CompressionType, IndexType
 
 import replay
 from replay.batch.select import load_all
-from replay.comparison.difference import Verdict
+from replay.comparison.difference import DiffVerdict
 from replay.errors import RecordingError
 from replay.recording.reader import read
 from replay.recording.slim import attached_files, write_slim
@@ -49,19 +49,19 @@ def test_it_reads_and_compares_as_the_one_that_was_recorded(tmp_path: Path, whol
     assert recording.events == original.events
     assert recording.files == synthetic.FILES and recording.provenance == original.provenance
     assert attached_files(path) == attached_files(whole)
-    assert replay.diff(whole, path).verdict is replay.diff(path, whole).verdict is Verdict.SAME
+    assert replay.diff(whole, path).verdict is replay.diff(path, whole).verdict is DiffVerdict.SAME
     assert summarize(path, salvage=True).topics == summarize(whole).topics
     tail = read(path, topics=["/tf", "/events"])
     assert tail.events == original.events and len(tail.time) == FRAMES
     write_slim(path, tmp_path / "slim" / "slim.mcap", tmp_path / "objects")
-    assert replay.diff(whole, tmp_path / "slim" / "slim.mcap").verdict is Verdict.SAME
+    assert replay.diff(whole, tmp_path / "slim" / "slim.mcap").verdict is DiffVerdict.SAME
 
 
 def test_a_change_in_it_is_found(tmp_path: Path, whole: Path) -> None:
     other = write(tmp_path / "made_up.mcap", FRAMES + 1)
     path = tmp_path / "anew.mcap"
     path.write_bytes(rewritten(other.read_bytes(), chunk_size=5000))
-    assert replay.diff(whole, path).verdict is Verdict.DIFFERENT
+    assert replay.diff(whole, path).verdict is DiffVerdict.DIFFERENT
 
 
 def test_cut_it_is_not_trusted(tmp_path: Path, whole: Path) -> None:

@@ -16,7 +16,7 @@ import trimesh
 from ruamel.yaml import YAML
 
 import replay
-from replay.batch.case import Status
+from replay.batch.case import CaseStatus
 from replay.batch.run import run_all
 from replay.batch.select import find_scenarios
 from replay.collision.columns import Level
@@ -116,7 +116,9 @@ def test_the_folder_holds_these_scenarios():
 def test_expectations_hold(runs, name):
     result, recording = runs[name]
     assert result.error == ""
-    assert result.status is Status.PASSED, [outcome.expectation for outcome in result.outcomes if not outcome.passed]
+    assert result.status is CaseStatus.PASSED, [
+        outcome.expectation for outcome in result.outcomes if not outcome.passed
+    ]
     assert recording is not None
     assert not recording.collision.undecided.any()
     assert len(recording.time) == result.frames

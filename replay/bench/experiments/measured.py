@@ -21,7 +21,7 @@ COUPLING = 10.0
 
 
 @dataclass(frozen=True)
-class Plate:
+class MeasuredPlate:
     """A sensor plate that was measured: its name in tables, its name in the scenarios, and its rows in the files."""
 
     name: str
@@ -35,9 +35,9 @@ class Plate:
         return {"sensor_x_cm": self.x, "sensor_y_cm": self.y}
 
 
-SMALL = Plate("5 x 5", "plate_5x5", "5", "5")
-LONG = Plate("4 x 20", "plate_4x20", "4", "20")
-BACKED = Plate("4 x 20, grounded back", "plate_4x20", "4", "20", back="22")
+SMALL = MeasuredPlate("5 x 5", "plate_5x5", "5", "5")
+LONG = MeasuredPlate("4 x 20", "plate_4x20", "4", "20")
+BACKED = MeasuredPlate("4 x 20, grounded back", "plate_4x20", "4", "20", back="22")
 PLATES = (SMALL, LONG, BACKED)
 SIDES = (10, 20, 30)
 """Edge lengths [cm] of the parallel target plates."""
@@ -72,19 +72,19 @@ class Bench:
 
     folder: Path
 
-    def parallel(self, plate: Plate, reading: Reading, side: int) -> Curve:
+    def parallel(self, plate: MeasuredPlate, reading: Reading, side: int) -> Curve:
         """Return the curve over the distance of a parallel target plate of that edge length [cm]."""
         where = {**plate.where(), "grounded_back_plate_cm": plate.back, "target_side_cm": str(side)}
         file = self.folder / "data" / "parallel_plate_curves.csv"
         return _read_as(reading, read_curve(file, x="distance_cm", y=reading.column, where=where))
 
-    def pivot(self, plate: Plate, reading: Reading, side: int) -> Curve:
+    def pivot(self, plate: MeasuredPlate, reading: Reading, side: int) -> Curve:
         """Return the curve over the angle of a pivoting target plate of that edge length [cm]."""
         where = {**plate.where(), "target_side_cm": str(side), "centre_distance_cm": str(PIVOT_CENTRES[side])}
         file = self.folder / "data" / "pivot_curves.csv"
         return _read_as(reading, read_curve(file, x="angle_deg", y=reading.column, where=where))
 
-    def path(self, plate: Plate, kind: str, side: int) -> SensorPath:
+    def path(self, plate: MeasuredPlate, kind: str, side: int) -> SensorPath:
         """Return the model of a plate in the scenario `parallel` or `pivot` of that target [cm]."""
         return _path(self.folder / f"{kind}_{side}cm.yaml", plate.sensor)
 

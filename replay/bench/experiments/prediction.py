@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.experiments.measured import (
     DELTA_STRAY,
@@ -19,16 +18,15 @@ from replay.bench.experiments.measured import (
     SIDES,
     SMALL,
     Bench,
-    Plate,
+    MeasuredPlate,
     Reading,
 )
 from replay.bench.experiments.tables import Cell, Table
 from replay.logs.curve_csv import Curve
+from replay.numerics.arrays import Floats
 from replay.scenario.calibration import CurveFit, SensorPath, fit_curve
+from replay.scenario.curve_plot import Line, Panel
 from replay.sensing.calibration import response
-from replay.sensing.curve_plot import Line, Panel
-
-Floats = NDArray[np.float64]
 
 FITTED_SIDE = 20
 """Edge length [cm] of the target plate that experiment II fits."""
@@ -48,7 +46,7 @@ class Prediction:
         predicted: (n,) in the curve's unit.
     """
 
-    plate: Plate
+    plate: MeasuredPlate
     reading: Reading
     fitted_side: int
     side: int
@@ -72,20 +70,20 @@ class Prediction:
         return int(np.argmax(np.abs(self.deviation)))
 
 
-def fit(bench: Bench, plate: Plate, reading: Reading, side: int = FITTED_SIDE) -> CurveFit:
+def fit(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int = FITTED_SIDE) -> CurveFit:
     """Return the fit on a parallel target plate of an edge length [cm]."""
     path, curve = bench.path(plate, "parallel", side), bench.parallel(plate, reading, side)
     return fit_curve(path, curve, quantity=reading.quantity, offset=reading.offset)
 
 
-def predict_parallel(bench: Bench, plate: Plate, reading: Reading, side: int) -> Prediction:
+def predict_parallel(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int) -> Prediction:
     """Return what the fit on 20 cm says of a parallel plate of another edge length [cm]."""
     found = fit(bench, plate, reading)
     path, curve = bench.path(plate, "parallel", side), bench.parallel(plate, reading, side)
     return Prediction(plate, reading, FITTED_SIDE, side, curve, _predicted(found, path, curve))
 
 
-def predict_pivot(bench: Bench, plate: Plate, reading: Reading, side: int, fitted_side: int) -> Prediction:
+def predict_pivot(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int, fitted_side: int) -> Prediction:
     """Return what the fit on a parallel plate says of a pivoting one; edge lengths [cm]."""
     found = fit(bench, plate, reading, fitted_side)
     path, curve = bench.path(plate, "pivot", side), bench.pivot(plate, reading, side)
@@ -228,7 +226,7 @@ def _span(values: Sequence[float]) -> str:
 
 def _panels(title: str, predictions: Iterable[Prediction]) -> list[Panel]:
     """Return one drawing for each shown quantity and sensor, with all its curves."""
-    groups: dict[tuple[Reading, Plate], list[Prediction]] = {}
+    groups: dict[tuple[Reading, MeasuredPlate], list[Prediction]] = {}
     for entry in predictions:
         if entry.reading in (SELF, DELTA_STRAY) and not entry.plate.back:
             groups.setdefault((entry.reading, entry.plate), []).append(entry)

@@ -9,7 +9,7 @@ from replay.bench.experiments import prediction, splitting
 from replay.bench.experiments.tables import Table
 from replay.errors import InvalidValue, RecordingExistsError
 from replay.logs.part_file import write_file
-from replay.sensing.curve_plot import Panel, draw
+from replay.scenario.curve_plot import Panel, draw
 
 EXPERIMENTS: dict[str, Callable[[Path], tuple[list[Table], list[Panel]]]] = {
     "I": splitting.run,

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.bench.experiments.tables import Cell, Table
 from replay.kinematics.motion import sample
+from replay.numerics.arrays import Floats
+from replay.scenario.curve_plot import Line, Panel
 from replay.scenario.load import load
 from replay.scenario.scene import Scene, build
 from replay.sensing.capacitive import CapacitiveSuite
-from replay.sensing.curve_plot import Line, Panel
 from replay.sensing.target import Target, make_target
 
-Floats = NDArray[np.float64]
 Answer = Callable[[], Floats]
 
 SCENARIO = "inclined_plate.yaml"

@@ -32,7 +32,7 @@ class Budget(NamedTuple):
     scale: float
 
 
-class Tally(NamedTuple):
+class SumTally(NamedTuple):
     """What is known of a sum.
 
     Attributes:
@@ -56,7 +56,7 @@ def budget_of(nodes: Floats, plate: PlacedPlate, rtol: float) -> Budget:
 
 
 @inlined_kernel
-def is_met(budget: Budget, tally: Tally) -> bool:
+def is_met(budget: Budget, tally: SumTally) -> bool:
     """Return whether the error bounds are small enough."""
     return tally.doubt + tally.spent <= budget.rtol * tally.least
 

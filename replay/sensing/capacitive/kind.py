@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.columns import CapacitiveColumns
-from replay.sensing.capacitive.part import ELECTROSTATIC, CapacitiveExpectation, CapacitiveMethod
-from replay.sensing.capacitive.part import CapacitiveSensor as Written
-from replay.sensing.kind import Drawing, Expected, Floats, Method, SensorKind, Suite
+from replay.sensing.capacitive.part import (
+    ELECTROSTATIC,
+    CapacitiveExpectation,
+    CapacitiveMethod,
+    CapacitiveSensorPart,
+)
+from replay.sensing.kind import Drawing, Expected, Method, SensorKind, Suite
 
 if TYPE_CHECKING:
     from replay.sensing.capacitive.sensor import CapacitiveSensor
@@ -27,7 +32,7 @@ class Capacitive(SensorKind):
     """Reads the capacitance between plates and what is around them, through a voltage divider."""
 
     name = "capacitive"
-    part = Written
+    part = CapacitiveSensorPart
     method = CapacitiveMethod
     revisions: ClassVar = {"tree": 5, "exact": 4, "midpoint": 3, "bem": 1}
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
@@ -44,7 +49,9 @@ class Capacitive(SensorKind):
 
         return suite
 
-    def sensor(self, name: str, part: Written, link: int, ignored_links: frozenset[int]) -> CapacitiveSensor:
+    def sensor(
+        self, name: str, part: CapacitiveSensorPart, link: int, ignored_links: frozenset[int]
+    ) -> CapacitiveSensor:
         """See `SensorKind`."""
         from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
 
@@ -55,11 +62,13 @@ class Capacitive(SensorKind):
         same = part.model_dump(exclude={"link", "plates", "back", "ignore"})
         return CapacitiveSensor(name=name, link=link, plates=plates, **same, ignored_links=ignored_links)
 
-    def own_shapes(self, part: Written) -> Mapping[tuple[str | int, ...], str]:
+    def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[tuple[str | int, ...], str]:
         """See `SensorKind`: what is behind the plates."""
         return {("back", index): name for index, name in enumerate(part.back)}
 
-    def with_shapes(self, sensor: CapacitiveSensor, part: Written, shapes: Mapping[str, Floats]) -> CapacitiveSensor:
+    def with_shapes(
+        self, sensor: CapacitiveSensor, part: CapacitiveSensorPart, shapes: Mapping[str, Floats]
+    ) -> CapacitiveSensor:
         """See `SensorKind`: what is behind the plates."""
         return replace(sensor, back=tuple((name, shapes[name]) for name in part.back))
 
@@ -80,7 +89,11 @@ class Capacitive(SensorKind):
         return suite.kernels(method=method.method, savings=savings)
 
     def notes(
-        self, parts: Mapping[str, Written], felt: Mapping[str, Sequence[str]], earth: Mapping[str, float], method: Any
+        self,
+        parts: Mapping[str, CapacitiveSensorPart],
+        felt: Mapping[str, Sequence[str]],
+        earth: Mapping[str, float],
+        method: Any,
     ) -> Iterator[tuple[tuple[str, ...], str]]:
         """See `SensorKind`: units and bodies."""
         if method.method in ELECTROSTATIC:
@@ -97,6 +110,6 @@ class Capacitive(SensorKind):
         outlines = [four[[0, 1, 2, 3, 0]] for four in corners.values()]
         return Drawing(_COLOR, 1.0, outlines, np.concatenate(list(corners.values())), corners)
 
-    def cost(self, part: Written, triangles: int) -> float:
+    def cost(self, part: CapacitiveSensorPart, triangles: int) -> float:
         """See `SensorKind`."""
         return 5.0 * len(part.plates) * math.sqrt(triangles)

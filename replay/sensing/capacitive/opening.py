@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.budget import Budget, Tally, is_met
+from replay.sensing.capacitive.budget import Budget, SumTally, is_met
 from replay.sensing.capacitive.cluster_bounds import faces, judge_nodes
 from replay.sensing.capacitive.clusters import BEGIN, END, SECOND_CHILD, Clusters
 from replay.sensing.capacitive.lanes import (
@@ -38,8 +38,8 @@ _EFFORT_RULE = 0.5
 
 @leaf_kernel
 def refine(
-    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, tally: Tally
-) -> tuple[int, float, int, Tally]:
+    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, tally: SumTally
+) -> tuple[int, float, int, SumTally]:
     """Judge the `size` nodes on the stack, and open the worst parts until the sum is good enough or a triangle is hard.
 
     Returns how many hard triangles, those without a rule, now are in `room.hard`, 0 when the parts are good enough; a
@@ -56,7 +56,7 @@ def refine(
         if is_met(budget, tally):
             # once more, without the rounding of sums that went up and down
             doubt, least = doubt_and_least(room.queue, tally.done - tally.spent)
-            tally = Tally(tally.done, tally.spent, least, doubt)
+            tally = SumTally(tally.done, tally.spent, least, doubt)
             if is_met(budget, tally):
                 return 0, 0.0, judged, tally
         size, waiting, limit, tally = _open_worst(clusters, budget, room, tally)
@@ -74,8 +74,8 @@ def _settle_nodes(
     waiting: int,
     limit: float,
     scale: float,
-    tally: Tally,
-) -> tuple[int, int, Tally]:
+    tally: SumTally,
+) -> tuple[int, int, SumTally]:
     """Judge the nodes on the stack and those below: up to an error of `limit` [m] they become parts, else are opened.
 
     Returns how many triangles wait to be judged, how many nodes were judged, and the tally.
@@ -105,13 +105,13 @@ def _settle_nodes(
                 doubt += error
             else:
                 size, waiting = _put_parts(clusters, room, node, size, waiting)
-    return waiting, judged, Tally(tally.done, tally.spent, least, doubt)
+    return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
 @inlined_kernel
 def _settle_triangles(
-    triangles: Floats, plate: PlacedPlate, room: Room, waiting: int, allowed: float, scale: float, tally: Tally
-) -> tuple[int, float, Tally]:
+    triangles: Floats, plate: PlacedPlate, room: Room, waiting: int, allowed: float, scale: float, tally: SumTally
+) -> tuple[int, float, SumTally]:
     """Judge the triangles that wait: those with a rule of an error up to `allowed` [m] become parts, others are hard.
 
     Returns how many are hard, a lower bound of what these bring [m], and the tally.
@@ -136,11 +136,11 @@ def _settle_triangles(
                 hard += 1
                 # one that does not face the plate may be among them
                 in_hard += 0.0 if plate.facing else lanes[(FOUND + LEAST) * LANES + i]
-    return hard, in_hard, Tally(tally.done, tally.spent, least, doubt)
+    return hard, in_hard, SumTally(tally.done, tally.spent, least, doubt)
 
 
 @inlined_kernel
-def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: Tally) -> tuple[int, int, float, Tally]:
+def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally) -> tuple[int, int, float, SumTally]:
     """Open the worst parts, at least as much error as there is too much.
 
     Returns how many nodes are on the stack, how many triangles wait to be judged, the least error that was opened [m],
@@ -165,7 +165,7 @@ def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: Tally) ->
         else:
             tasks[waiting], firsts[waiting] = part, rule + 1
             waiting += 1
-    return size, waiting, limit, Tally(tally.done, tally.spent, least, doubt)
+    return size, waiting, limit, SumTally(tally.done, tally.spent, least, doubt)
 
 
 @inlined_kernel

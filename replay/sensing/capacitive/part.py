@@ -20,7 +20,7 @@ ELECTROSTATIC = ("bem",)
 """The methods that compute charges on conductors."""
 
 
-class Plate(Part):
+class PlatePart(Part):
     """A rectangular plate, in the xy plane of its pose, centred at the origin; its front faces +z."""
 
     pose: Pose = Pose()
@@ -29,12 +29,12 @@ class Plate(Part):
     """Edge lengths along x and y [m]."""
 
 
-class CapacitiveSensor(Part):
+class CapacitiveSensorPart(Part):
     """Reads the capacitance between its plates and everything it senses, through a voltage divider."""
 
     link: Name
     """The link that carries the plates."""
-    plates: Annotated[dict[Name, Plate], Field(min_length=1)]
+    plates: Annotated[dict[Name, PlatePart], Field(min_length=1)]
     """Plates by name; their capacitances add up."""
     coupling: Capacitance
     """Coupling capacitance of the voltage divider [F]."""

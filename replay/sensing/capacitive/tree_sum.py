@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import entry, kernel, leaf_kernel
-from replay.sensing.capacitive.budget import Tally, budget_of
+from replay.sensing.capacitive.budget import SumTally, budget_of
 from replay.sensing.capacitive.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.hard_triangles import sum_exactly, sum_hard
 from replay.sensing.capacitive.lanes import LANES
@@ -116,7 +116,7 @@ def _sum_one(
     if count > 0 and any_saturates(triangles, room.hard, count, plate, pieces.triangle):
         return math.inf, True, 0.0
     empty(room.queue)
-    budget, tally, lost = budget_of(clusters.nodes, plate, rtol), Tally(0.0, 0.0, 0.0, 0.0), 0.0
+    budget, tally, lost = budget_of(clusters.nodes, plate, rtol), SumTally(0.0, 0.0, 0.0, 0.0), 0.0
     room.stack[0] = 0
     size, judged, alone, touching = 1, 0, 0, False
     while True:
@@ -144,7 +144,7 @@ def _sum_one(
             lost += e
             least += value - error
             spent += error
-        tally = Tally(done, spent, least, doubt)
+        tally = SumTally(done, spent, least, doubt)
     parts, lost_in_parts, whole, in_whole, others = sum_of_parts(clusters, plate, room)
     _add_counts(counts, judged, whole, in_whole, alone + others)
     total, e = two_sum(tally.done, parts)

@@ -28,22 +28,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.surface_boxes import AXES, CENTRE, HALVES, SHORT
 from replay.geometry.wide_tree import LANES
+from replay.numerics.arrays import Floats, Singles
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import kernel
-from replay.sensing.distance.cone import EPSILON, Cone
-from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
+from replay.numerics.triples import Triple, combined, cross, dot, minus, norm, scaled
+from replay.sensing.distance.cone import Cone
 
 _THIRD = 1.0 / 3.0
 
 
 @kernel
-def single_vector(numbers: Singles, first: int, lane: int) -> Vector:
+def single_vector(numbers: Singles, first: int, lane: int) -> Triple:
     """Return three numbers of a lane, in double precision."""
     return (
         np.float64(numbers[lane + LANES * first]),
@@ -53,7 +51,7 @@ def single_vector(numbers: Singles, first: int, lane: int) -> Vector:
 
 
 @kernel
-def corner_from(apex: Vector, corners: Floats, corner: int, lane: int) -> Vector:
+def corner_from(apex: Triple, corners: Floats, corner: int, lane: int) -> Triple:
     """Return a corner of a lane's triangle, seen from the apex."""
     return (
         corners[lane + 3 * LANES * corner] - apex[0],
@@ -63,7 +61,7 @@ def corner_from(apex: Vector, corners: Floats, corner: int, lane: int) -> Vector
 
 
 @kernel
-def box_bounds(boxes: Singles, middle: Vector, cone: Cone, slack: float, bounds: Floats) -> None:
+def box_bounds(boxes: Singles, middle: Triple, cone: Cone, slack: float, bounds: Floats) -> None:
     """Write lower bounds of the squared distances [m^2] of a node's boxes; inf when nothing of it is in the cone.
 
     Args:
@@ -105,19 +103,19 @@ def box_bounds(boxes: Singles, middle: Vector, cone: Cone, slack: float, bounds:
 
 
 @kernel
-def _clamped(a: Vector, e: Vector, squared: float) -> Vector:
+def _clamped(a: Triple, e: Triple, squared: float) -> Triple:
     """Return the point of the edge from a to a + e that is closest to the origin; `squared` is |e|^2."""
     t = -dot(a, e) / squared if squared > 0.0 else 0.0
     return combined(1.0, a, min(max(t, 0.0), 1.0), e)
 
 
 @kernel
-def _either(first: bool, a: Vector, b: Vector) -> Vector:
+def _either(first: bool, a: Triple, b: Triple) -> Triple:
     return a[0] if first else b[0], a[1] if first else b[1], a[2] if first else b[2]
 
 
 @kernel
-def triangle_bounds(corners: Floats, apex: Vector, cone: Cone, slack: float, bounds: Floats) -> None:
+def triangle_bounds(corners: Floats, apex: Triple, cone: Cone, slack: float, bounds: Floats) -> None:
     """Write lower bounds of the squared distances [m^2] of a leaf's triangles; inf when nothing of it is in the cone.
 
     Args:
@@ -136,7 +134,7 @@ def triangle_bounds(corners: Floats, apex: Vector, cone: Cone, slack: float, bou
             corner_from(apex, corners, 1, lane),
             corner_from(apex, corners, 2, lane),
         )
-        ab, bc, ca = subtract(b, a), subtract(c, b), subtract(a, c)
+        ab, bc, ca = minus(b, a), minus(c, b), minus(a, c)
         ab2, bc2, ca2 = dot(ab, ab), dot(bc, bc), dot(ca, ca)
 
         # Cone

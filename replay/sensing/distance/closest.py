@@ -6,15 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.numerics.arguments import as_float, as_floats
+from replay.numerics.arrays import Floats
 from replay.sensing.distance.cone import Cone, half_angle
 from replay.sensing.distance.query import closest_of_all
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class ConeHit:
 
     detected: bool
     distance: float
-    point: Array
+    point: Floats
     triangle: int
     case: int
 
@@ -113,7 +112,7 @@ def _scaled_range(range: float, exponent: int) -> float:
         return math.inf
 
 
-def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
     array = as_floats(name, value, shape)
     if not np.all(np.isfinite(array)):
         raise InvalidValue(name, "an array with NaN or infinity", "must be finite")

@@ -6,14 +6,8 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Bytes, Floats, ShortIntegers
 from replay.numerics.columns import Columns, Field
-
-Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-Integers = NDArray[np.int32]
 
 
 class Detection(enum.IntEnum):
@@ -44,6 +38,6 @@ class DistanceColumns(Columns):
     point: Annotated[Floats, Field(unit="m", gate="status", label="point in world", letters="xyz", beam=True)]
     point_sensor: Annotated[Floats, Field(unit="m", gate="status", label="point in sensor", letters="xyz")]
     normal: Annotated[Floats, Field(gate="status", label="normal in world", letters="xyz")]
-    shape: Annotated[Integers, Field(gate="status", names="shapes")]
-    triangle: Annotated[Integers, Field(gate="status")]
+    shape: Annotated[ShortIntegers, Field(gate="status", names="shapes")]
+    triangle: Annotated[ShortIntegers, Field(gate="status")]
     case: Annotated[Bytes, Field(gate="status", most=5)]

@@ -10,12 +10,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import kernel
-from replay.sensing.distance.vectors import Vector, accurate_cross, dot, norm
-
-EPSILON = float(np.finfo(np.float64).eps)
+from replay.numerics.triples import Triple, dot, norm
+from replay.sensing.distance.products import accurate_cross
 
 TOUCH = 256.0 * EPSILON
 """Rounding of a coordinate of a corner, as part of the largest such coordinate of the triangle, seen from the apex.
@@ -52,7 +50,7 @@ def half_angle(aperture: float) -> tuple[float, float]:
 
 
 @kernel
-def touches(q: Vector, length: float, size: Vector, apex: float) -> bool:
+def touches(q: Triple, length: float, size: Triple, apex: float) -> bool:
     """Return whether q is no farther from the origin than rounding the apex or the corners could have put it.
 
     Moving each coordinate i of the corners by `TOUCH` size_i changes the distance along q by their weighted sum. Of a
@@ -71,7 +69,7 @@ def touches(q: Vector, length: float, size: Vector, apex: float) -> bool:
 
 
 @kernel
-def in_cone(x: Vector, cone: Cone) -> bool:
+def in_cone(x: Triple, cone: Cone) -> bool:
     """Return whether x lies in the cone; accurate for needles and for 180 deg."""
     v = (cone.vx, cone.vy, cone.vz)
     outside = norm(accurate_cross(v, x)) * cone.cos_half - dot(v, x) * cone.sin_half

@@ -21,12 +21,13 @@ import math
 import numpy as np
 
 from replay.numerics.jit import kernel
+from replay.numerics.triples import Triple, combined, cross, dot, minus, norm, scaled
 from replay.sensing.distance.cone import CORNER, EDGE_BORDER, EDGE_FOOT, NOTHING, Cone, in_cone, touches
-from replay.sensing.distance.vectors import Vector, accurate_cross, combined, cross, dot, norm, scaled, subtract
+from replay.sensing.distance.products import accurate_cross
 
 
 @kernel
-def _radial_edge(a: Vector, b: Vector, length_a: float, length_b: float, cone: Cone) -> tuple[float, Vector, int]:
+def _radial_edge(a: Triple, b: Triple, length_a: float, length_b: float, cone: Cone) -> tuple[float, Triple, int]:
     """Return the candidate of an edge that is a point or lies on a line through the apex."""
     if dot(a, b) < 0.0:
         return 0.0, (0.0, 0.0, 0.0), EDGE_FOOT
@@ -50,7 +51,7 @@ def _in_volume(x: float, entry: float, exit: float, wide: bool) -> bool:
 
 
 @kernel
-def _foot(a: Vector, e: Vector, area: Vector, doubled: float, squared: float) -> tuple[float, Vector]:
+def _foot(a: Triple, e: Triple, area: Triple, doubled: float, squared: float) -> tuple[float, Triple]:
     """Return distance and place of the foot of the apex on an edge's line.
 
     On a line along an axis it takes two coordinates from the corner as they are, so that a range that ends on the edge
@@ -69,11 +70,11 @@ def _foot(a: Vector, e: Vector, area: Vector, doubled: float, squared: float) ->
 
 @kernel
 def closest_on_edge(
-    a: Vector, b: Vector, length_a: float, length_b: float, cone: Cone, size: Vector
-) -> tuple[float, Vector, int]:
+    a: Triple, b: Triple, length_a: float, length_b: float, cone: Cone, size: Triple
+) -> tuple[float, Triple, int]:
     """Return distance (inf when none), point and case of the closest point in the cone; see `touches` for `size`."""
     area = accurate_cross(a, b)
-    e = subtract(b, a)
+    e = minus(b, a)
     doubled = norm(area)
     squared = dot(e, e)
     # No plane: an edge on a line through the apex

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import MissingPackageError
+from replay.numerics.arrays import Floats
 from replay.sensing.distance.readings import Nearest
-
-Array = NDArray[np.float64]
 
 
 class EmbreeBundle:
@@ -23,7 +21,7 @@ class EmbreeBundle:
         MissingPackageError: embreex is not installed.
     """
 
-    def __init__(self, triangles: Array) -> None:
+    def __init__(self, triangles: Floats) -> None:
         try:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
@@ -32,7 +30,7 @@ class EmbreeBundle:
         self._scene: Any = EmbreeScene()
         self._mesh = TriangleMesh(self._scene, triangles.astype(np.float32))
 
-    def sweep(self, T_target_sensor: Array, directions: Array, reach: float, target: int, nearest: Nearest) -> None:
+    def sweep(self, T_target_sensor: Floats, directions: Floats, reach: float, target: int, nearest: Nearest) -> None:
         """Update `nearest` in every frame; arguments as `replay.sensing.distance.rays.sweep_rays`."""
         x, y, z = directions[:, 0], directions[:, 1], directions[:, 2]
         for i, pose in enumerate(T_target_sensor):

@@ -6,19 +6,17 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.wide_tree import LANES, MAX_WAITING, WIDE_TREE_TYPE, WideTree
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel
 from replay.sensing.distance.cone import Cone
 from replay.sensing.distance.query import COMPUTED, LOOKED_AT, REPEATED, closest_in_tree, closest_of_all
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
 
-Array = NDArray[np.float64]
-
 
 @kernel
-def same_pose(poses: Array, a: int, b: int) -> bool:
+def same_pose(poses: Floats, a: int, b: int) -> bool:
     """Return whether frames a and b hold the same pose, bit for bit."""
     for row in range(3):
         for column in range(4):
@@ -28,7 +26,7 @@ def same_pose(poses: Array, a: int, b: int) -> bool:
 
 
 @kernel
-def axis_of(pose: Array) -> tuple[float, float, float]:
+def axis_of(pose: Floats) -> tuple[float, float, float]:
     """Return the unit z axis of a pose."""
     x, y, z = pose[0, 2], pose[1, 2], pose[2, 2]
     length = math.sqrt(x * x + y * y + z * z)
@@ -49,16 +47,16 @@ def axis_of(pose: Array) -> tuple[float, float, float]:
 )
 @kernel
 def sweep_exact(
-    triangles: Array,
+    triangles: Floats,
     tree: WideTree,
-    T_target_sensor: Array,
+    T_target_sensor: Floats,
     cos_half: float,
     sin_half: float,
-    rounding: Array,
+    rounding: Floats,
     reach: float,
     target: int,
     nearest: Nearest,
-    counts: NDArray[np.int64],
+    counts: Integers,
 ) -> None:
     """Update `nearest` in every frame with the target's closest point in the sensor's cone.
 
@@ -117,15 +115,15 @@ def sweep_exact(
 )
 @kernel
 def sweep_scan(
-    triangles: Array,
-    T_target_sensor: Array,
+    triangles: Floats,
+    T_target_sensor: Floats,
     cos_half: float,
     sin_half: float,
-    rounding: Array,
+    rounding: Floats,
     reach: float,
     target: int,
     nearest: Nearest,
-    counts: NDArray[np.int64],
+    counts: Integers,
 ) -> None:
     """As `sweep_exact`, by every triangle in every frame."""
     for i in range(len(T_target_sensor)):

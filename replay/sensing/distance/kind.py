@@ -8,8 +8,7 @@ import numpy as np
 
 from replay.numerics import transforms
 from replay.sensing.distance.columns import Detection, DistanceColumns
-from replay.sensing.distance.part import DistanceExpectation, DistanceMethod
-from replay.sensing.distance.part import DistanceSensor as Written
+from replay.sensing.distance.part import DistanceExpectation, DistanceMethod, DistanceSensorPart
 from replay.sensing.kind import Drawing, Expected, SensorKind
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ class Distance(SensorKind):
     """Reads the distance to the closest point in a cone."""
 
     name = "distance"
-    part = Written
+    part = DistanceSensorPart
     method = DistanceMethod
     revisions: ClassVar = {"exact": 3, "rays": 2, "thesis": 2}
     models: ClassVar = {"thesis2015": DistanceMethod(method="thesis")}
@@ -42,7 +41,7 @@ class Distance(SensorKind):
 
         return suite
 
-    def sensor(self, name: str, part: Written, link: int, ignored_links: frozenset[int]) -> DistanceSensor:
+    def sensor(self, name: str, part: DistanceSensorPart, link: int, ignored_links: frozenset[int]) -> DistanceSensor:
         """See `SensorKind`."""
         from replay.sensing.distance.suite import DistanceSensor
 
@@ -60,6 +59,6 @@ class Distance(SensorKind):
         sides = [np.stack([apex, rim[k]]) for k in range(0, _SEGMENTS, _SEGMENTS // 8)]
         return Drawing(_COLOR, 0.8, [*sides, rim] if np.isfinite(sensor.range) else sides, apex[None], {})
 
-    def cost(self, part: Written, triangles: int) -> float:
+    def cost(self, part: DistanceSensorPart, triangles: int) -> float:
         """See `SensorKind`: the nearest triangles are found at once, however many there are."""
         return 20.0

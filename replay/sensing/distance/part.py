@@ -12,7 +12,7 @@ from replay.language.units import Aperture, Distance, Range
 from replay.sensing.kind import Method
 
 
-class DistanceSensor(Part):
+class DistanceSensorPart(Part):
     """Reads the distance to the closest point inside a cone; the cone's apex is the pose's origin, its axis +z."""
 
     link: Name

@@ -8,16 +8,15 @@ Up to `_SCANNED` triangles the walk is a scan; from 3 on it was measured to win.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.wide_tree import LANES, WideTree
+from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import kernel
+from replay.numerics.triples import Triple
 from replay.sensing.distance.bounds import box_bounds, corner_from, triangle_bounds
-from replay.sensing.distance.cone import EPSILON, TOUCH, Cone
+from replay.sensing.distance.cone import TOUCH, Cone
 from replay.sensing.distance.triangle import closest_on_triangle
-from replay.sensing.distance.vectors import Vector
-
-Array = NDArray[np.float64]
 
 LARGEST = float(np.finfo(np.float64).max)
 
@@ -33,7 +32,7 @@ _SCANNED = 2
 
 
 @kernel
-def on_triangle(triangles: Array, k: int, apex: Vector, cone: Cone) -> tuple[float, Vector, int]:
+def on_triangle(triangles: Floats, k: int, apex: Triple, cone: Cone) -> tuple[float, Triple, int]:
     """Return distance (inf when none), point relative to the apex and case for triangle k."""
     t = triangles[k]
     a = (t[0, 0] - apex[0], t[0, 1] - apex[1], t[0, 2] - apex[2])
@@ -43,7 +42,7 @@ def on_triangle(triangles: Array, k: int, apex: Vector, cone: Cone) -> tuple[flo
 
 
 @kernel
-def query_slack(tree: WideTree, apex: Vector, rounding: float) -> float:
+def query_slack(tree: WideTree, apex: Triple, rounding: float) -> float:
     """Return what rounding, the apex's own included, can change in any distance between the apex and the mesh [m]."""
     farthest = 0.0
     for axis in range(3):
@@ -52,7 +51,7 @@ def query_slack(tree: WideTree, apex: Vector, rounding: float) -> float:
 
 
 @kernel
-def closest_of_all(triangles: Array, apex: Vector, cone: Cone, reach: float) -> tuple[float, Vector, int, int]:
+def closest_of_all(triangles: Floats, apex: Triple, cone: Cone, reach: float) -> tuple[float, Triple, int, int]:
     """Return distance (inf when none is within reach), point relative to the apex, triangle (-1) and case (0)."""
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, 0
     for k in range(len(triangles)):
@@ -63,7 +62,7 @@ def closest_of_all(triangles: Array, apex: Vector, cone: Cone, reach: float) -> 
 
 
 @kernel
-def _on_leaf(corners: Array, lane: int, apex: Vector, cone: Cone) -> tuple[float, Vector, int]:
+def _on_leaf(corners: Floats, lane: int, apex: Triple, cone: Cone) -> tuple[float, Triple, int]:
     """As `on_triangle`, for one triangle of a leaf."""
     a, b, c = (
         corner_from(apex, corners, 0, lane),
@@ -81,17 +80,17 @@ def _squared_limit(limit: float, slack: float) -> float:
 
 @kernel
 def closest_in_tree(
-    triangles: Array,
+    triangles: Floats,
     tree: WideTree,
-    apex: Vector,
+    apex: Triple,
     cone: Cone,
     reach: float,
     start: int,
-    stack: NDArray[np.int64],
-    waiting: Array,
-    bounds: Array,
-    counts: NDArray[np.int64],
-) -> tuple[float, Vector, int, int]:
+    stack: Integers,
+    waiting: Floats,
+    bounds: Floats,
+    counts: Integers,
+) -> tuple[float, Triple, int, int]:
     """As `closest_of_all`, through the tree.
 
     Args:

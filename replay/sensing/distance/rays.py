@@ -14,23 +14,22 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.arrays import Floats, Integers
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
-from replay.sensing.distance.cone import EPSILON
+from replay.numerics.triples import Triple, cross, dot, minus, norm
 from replay.sensing.distance.exact import same_pose
+from replay.sensing.distance.products import accurate_cross
 from replay.sensing.distance.query import SLACK
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
-from replay.sensing.distance.vectors import Vector, accurate_cross, cross, dot, norm, subtract
-
-Array = NDArray[np.float64]
 
 _IN_PLANE = 16.0 * EPSILON
 """Rounding of what d · ((b - a) × (c - a)) is made of, as part of the farthest corner times the longest edge at a."""
 
 
-def cap_directions(aperture: float, count: int) -> Array:
+def cap_directions(aperture: float, count: int) -> Floats:
     """Return the unit directions (count, 3) of the rays in the sensor's frame, axis +z.
 
     Args:
@@ -48,7 +47,7 @@ def cap_directions(aperture: float, count: int) -> Array:
 
 
 @kernel
-def _box_entry(tree: Tree, node: int, origin: Vector, d: Vector, slack: float) -> float:
+def _box_entry(tree: Tree, node: int, origin: Triple, d: Triple, slack: float) -> float:
     """Return where the ray enters a node's box, grown by the slack; inf when it does not."""
     entry, leave = 0.0, np.inf
     for axis in range(3):
@@ -63,14 +62,14 @@ def _box_entry(tree: Tree, node: int, origin: Vector, d: Vector, slack: float) -
 
 
 @kernel
-def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> float:
+def ray_hit(a: Triple, b: Triple, c: Triple, d: Triple, rounding: float) -> float:
     """Return how far along the unit direction d from the origin the triangle is hit, from either side; inf when not.
 
     The ray passes each edge on the side that the sign of d · (a × b) tells, so it cannot slip between two triangles.
     One in the triangle's plane, to rounding, hits nothing: where it meets the plane is noise. A hit no farther than the
     rounding of the origin [m], before or behind it, is on it.
     """
-    ab, ac = subtract(b, a), subtract(c, a)
+    ab, ac = minus(b, a), minus(c, a)
     normal = cross(ab, ac)
     turn = dot(d, normal)
     extent = max(norm(a), norm(b), norm(c))
@@ -95,13 +94,13 @@ def ray_hit(a: Vector, b: Vector, c: Vector, d: Vector, rounding: float) -> floa
 
 @kernel
 def _nearest_hit(
-    triangles: Array,
+    triangles: Floats,
     tree: Tree,
-    origin: Vector,
-    d: Vector,
+    origin: Triple,
+    d: Triple,
     rounding: float,
     limit: float,
-    stack: NDArray[np.int64],
+    stack: Integers,
     slack: float,
 ) -> tuple[float, int]:
     """Return distance and triangle of the first hit nearer than the limit; inf and -1 when there is none."""
@@ -134,11 +133,11 @@ def _nearest_hit(
 @entry(float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1], float64[:, ::1], float64[::1], float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_rays(
-    triangles: Array,
+    triangles: Floats,
     tree: Tree,
-    T_target_sensor: Array,
-    directions: Array,
-    rounding: Array,
+    T_target_sensor: Floats,
+    directions: Floats,
+    rounding: Floats,
     reach: float,
     target: int,
     nearest: Nearest,

@@ -7,15 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int32, uint8
-from numpy.typing import NDArray
 
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Bytes, Floats, ShortIntegers
 from replay.numerics.jit import record
 from replay.sensing.distance.columns import Detection, DistanceColumns
 from replay.sensing.target import Target
-
-Array = NDArray[np.float64]
 
 
 class Nearest(NamedTuple):
@@ -24,11 +22,11 @@ class Nearest(NamedTuple):
     The first target keeps the place when a later one is only as close.
     """
 
-    distance: Array  # (n,) [m], inf while nothing is found
-    offset: Array  # (n, 3) from the apex to the point, in the frame of the link of the target [m]
-    target: NDArray[np.int32]  # (n,), -1 while nothing is found
-    triangle: NDArray[np.int32]  # (n,)
-    case: NDArray[np.uint8]  # (n,)
+    distance: Floats  # (n,) [m], inf while nothing is found
+    offset: Floats  # (n, 3) from the apex to the point, in the frame of the link of the target [m]
+    target: ShortIntegers  # (n,), -1 while nothing is found
+    triangle: ShortIntegers  # (n,)
+    case: Bytes  # (n,)
 
     def of(self, frames: slice) -> Nearest:
         """Return the part of some frames, which shares their memory."""
@@ -56,7 +54,7 @@ def write_sensor(
     column: int,
     nearest: Nearest,
     targets: Sequence[Target],
-    T_target_sensor: dict[int, Array],
+    T_target_sensor: dict[int, Floats],
     poses: LinkPoses,
     min_range: float,
 ) -> None:
@@ -92,13 +90,13 @@ def write_sensor(
         columns.case[frames, column] = nearest.case[frames]
 
 
-def _rotated(rotation: Array, vectors: Array) -> Array:
+def _rotated(rotation: Floats, vectors: Floats) -> Floats:
     x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
     rows = [rotation[:, r, 0] * x + rotation[:, r, 1] * y + rotation[:, r, 2] * z for r in range(3)]
     return np.stack(rows, axis=-1)
 
 
-def _unit_normals(corners: Array, fallback: Array) -> Array:
+def _unit_normals(corners: Floats, fallback: Floats) -> Floats:
     """Return the triangles' outward unit normals (n, 3); `fallback` where a triangle has no area."""
     u, w = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.stack([u[:, i] * w[:, j] - u[:, j] * w[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)

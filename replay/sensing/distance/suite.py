@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue, count
 from replay.geometry import surface_boxes, tree, wide_tree
@@ -17,6 +16,7 @@ from replay.geometry.tree import triangle_tree
 from replay.geometry.wide_tree import widen
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats, ShortIntegers
 from replay.numerics.jit import entries_of
 from replay.sensing.distance.closest import check_aperture, check_range
 from replay.sensing.distance.columns import DistanceColumns
@@ -30,8 +30,7 @@ from replay.sensing.distance.readings import Nearest, nothing_yet, write_sensor
 from replay.sensing.distance.thesis import sweep_thesis
 from replay.sensing.target import Target
 
-Array = NDArray[np.float64]
-Sweep = Callable[["DistanceSensor", int, Array, Array, Nearest], None]
+Sweep = Callable[["DistanceSensor", int, Floats, Floats, Nearest], None]
 
 METHODS = ("exact", "rays", "thesis")
 ENGINES = ("own", "embree")
@@ -65,7 +64,7 @@ class DistanceSensor:
 
     name: str
     link: int
-    T_link_sensor: Array
+    T_link_sensor: Floats
     aperture: float
     range: float = math.inf
     min_range: float = 0.0
@@ -134,7 +133,7 @@ class DistanceSuite:
         self._savings = savings
         self.counters = DistanceCounters()
         self._sweep = self._sweeper(engine)
-        self._covered: NDArray[np.int32] | None = None
+        self._covered: ShortIntegers | None = None
         self._frames, self._inside = 0, np.zeros((len(self.sensors), len(self.targets)), dtype=np.int64)
 
     def run(self, poses: LinkPoses) -> DistanceColumns:
@@ -148,11 +147,11 @@ class DistanceSuite:
         """
         frames = len(poses.local)
         columns = DistanceColumns.nothing(frames, len(self.sensors))
-        relative: dict[tuple[int, int], Array] = {}
-        way: dict[tuple[int, int], Array] = {}
+        relative: dict[tuple[int, int], Floats] = {}
+        way: dict[tuple[int, int], Floats] = {}
         for column, sensor in enumerate(self.sensors):
             nearest = nothing_yet(frames)
-            T_target_sensor: dict[int, Array] = {}
+            T_target_sensor: dict[int, Floats] = {}
             for index, target in enumerate(self.targets):
                 if not sensor.sees(target):
                     continue
@@ -200,7 +199,7 @@ class DistanceSuite:
         first = touching[0] if self._covered is None else self._covered
         self._covered = np.where((touching == first).all(axis=0), first, -1)
 
-    def _count_inside(self, column: int, nearest: Nearest, T_target_sensor: dict[int, Array]) -> None:
+    def _count_inside(self, column: int, nearest: Nearest, T_target_sensor: dict[int, Floats]) -> None:
         for index, pose in T_target_sensor.items():
             target = self.targets[index]
             if target.closing is not None:
@@ -223,15 +222,15 @@ class DistanceSuite:
             return self._rays
         bundles = [EmbreeBundle(target.triangles) for target in self.targets]
 
-        def embree(sensor: DistanceSensor, index: int, pose: Array, _rounding: Array, nearest: Nearest) -> None:
+        def embree(sensor: DistanceSensor, index: int, pose: Floats, _rounding: Floats, nearest: Nearest) -> None:
             bundles[index].sweep(pose, self._pattern(sensor), sensor.range, index, nearest)
 
         return embree
 
-    def _pattern(self, sensor: DistanceSensor) -> Array:
+    def _pattern(self, sensor: DistanceSensor) -> Floats:
         return self._patterns[self.sensors.index(sensor)]
 
-    def _exact(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
+    def _exact(self, sensor: DistanceSensor, index: int, pose: Floats, rounding: Floats, nearest: Nearest) -> None:
         target = self.targets[index]
         cone, counts = (*half_angle(sensor.aperture), rounding, sensor.range), np.zeros(COUNTS, dtype=np.int64)
         if self._savings:
@@ -240,11 +239,11 @@ class DistanceSuite:
             sweep_scan(target.triangles, pose, *cone, index, nearest, counts)
         self.counters.add(counts.tolist())
 
-    def _thesis(self, sensor: DistanceSensor, index: int, pose: Array, _rounding: Array, nearest: Nearest) -> None:
+    def _thesis(self, sensor: DistanceSensor, index: int, pose: Floats, _rounding: Floats, nearest: Nearest) -> None:
         cos_half = math.cos(0.5 * sensor.aperture)
         sweep_thesis(self.targets[index].triangles, pose, cos_half, sensor.range, index, nearest)
 
-    def _rays(self, sensor: DistanceSensor, index: int, pose: Array, rounding: Array, nearest: Nearest) -> None:
+    def _rays(self, sensor: DistanceSensor, index: int, pose: Floats, rounding: Floats, nearest: Nearest) -> None:
         triangles, pattern = self.targets[index].triangles, self._pattern(sensor)
         sweep_rays(triangles, self._trees[index], pose, pattern, rounding, sensor.range, index, nearest)
 

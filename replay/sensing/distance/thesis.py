@@ -28,31 +28,30 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
-from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, EPSILON, FOOT, NOTHING
+from replay.numerics.triples import Triple, combined, cross, dot, minus, norm, scaled
+from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EDGE_BORDER, EDGE_FOOT, FOOT, NOTHING
 from replay.sensing.distance.exact import axis_of, same_pose
 from replay.sensing.distance.readings import NEAREST_TYPE, Nearest
-from replay.sensing.distance.vectors import Vector, combined, cross, dot, norm, scaled, subtract
-
-Array = NDArray[np.float64]
 
 _VANISHING = 8.0 * EPSILON
 """Rounding of the quadratic's leading coefficient, as part of the direction's square: less than this is nothing."""
 
 
 @kernel
-def _in_triangle(x: Vector, a: Vector, b: Vector, c: Vector, normal: Vector) -> bool:
-    if dot(normal, cross(subtract(b, a), subtract(x, a))) < 0.0:
+def _in_triangle(x: Triple, a: Triple, b: Triple, c: Triple, normal: Triple) -> bool:
+    if dot(normal, cross(minus(b, a), minus(x, a))) < 0.0:
         return False
-    if dot(normal, cross(subtract(c, b), subtract(x, b))) < 0.0:
+    if dot(normal, cross(minus(c, b), minus(x, b))) < 0.0:
         return False
-    return dot(normal, cross(subtract(a, c), subtract(x, c))) >= 0.0
+    return dot(normal, cross(minus(a, c), minus(x, c))) >= 0.0
 
 
 @kernel
-def _roots(p: Vector, e: Vector, v: Vector, cos_half: float) -> tuple[float, float]:
+def _roots(p: Triple, e: Triple, v: Triple, cos_half: float) -> tuple[float, float]:
     """Return the roots of (v · x)^2 = |x|^2 cos^2 h on x = p + t e, the smaller first; NaN when there are none."""
     square = cos_half * cos_half
     leading = dot(v, e) * dot(v, e) - square * dot(e, e)
@@ -67,12 +66,12 @@ def _roots(p: Vector, e: Vector, v: Vector, cos_half: float) -> tuple[float, flo
 
 
 @kernel
-def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float) -> tuple[float, Vector, int]:
+def thesis_triangle(a: Triple, b: Triple, c: Triple, v: Triple, cos_half: float) -> tuple[float, Triple, int]:
     """Return distance (inf when none), point and case of a triangle relative to the apex, by the thesis's steps."""
     best, point, case = np.inf, a, NOTHING
 
     # 1: R
-    normal = cross(subtract(b, a), subtract(c, a))
+    normal = cross(minus(b, a), minus(c, a))
     area = norm(normal)
     if area > 0.0:
         n = scaled(1.0 / area, normal)
@@ -83,7 +82,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
         # 2: the ray from R towards S
         lean = dot(n, v)
         if lean != 0.0:
-            towards = subtract(scaled(height / lean, v), R)
+            towards = minus(scaled(height / lean, v), R)
             t1, t2 = _roots(R, towards, v, cos_half)
             for t in (t2, t1):
                 x = combined(1.0, R, t, towards)
@@ -96,7 +95,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
         p = first
         q = b if edge == 0 else (c if edge == 1 else a)
         first = q
-        e = subtract(q, p)
+        e = minus(q, p)
         t1, t2 = _roots(p, e, v, cos_half)
         for t in (t1, t2):
             x = combined(1.0, p, t, e)
@@ -116,7 +115,7 @@ def thesis_triangle(a: Vector, b: Vector, c: Vector, v: Vector, cos_half: float)
 @entry(float64[:, :, ::1], float64[:, :, ::1], float64, float64, int64, NEAREST_TYPE)
 @kernel
 def sweep_thesis(
-    triangles: Array, T_target_sensor: Array, cos_half: float, reach: float, target: int, nearest: Nearest
+    triangles: Floats, T_target_sensor: Floats, cos_half: float, reach: float, target: int, nearest: Nearest
 ) -> None:
     """As `replay.sensing.distance.exact.sweep_exact`, by the thesis's steps on every triangle."""
     best, point, triangle, case = np.inf, (np.nan, np.nan, np.nan), -1, NOTHING

@@ -22,20 +22,12 @@ from __future__ import annotations
 
 import math
 
+from replay.numerics.constants import EPSILON
 from replay.numerics.jit import kernel
-from replay.sensing.distance.cone import CONIC_BORDER, CORNER, EPSILON, FOOT, Cone, touches
+from replay.numerics.triples import Triple, combined, cross, dot, minus, norm, scaled
+from replay.sensing.distance.cone import CONIC_BORDER, CORNER, FOOT, Cone, touches
 from replay.sensing.distance.edge import closest_on_edge
-from replay.sensing.distance.vectors import (
-    Vector,
-    accurate_cross,
-    accurate_normal,
-    combined,
-    cross,
-    dot,
-    norm,
-    scaled,
-    subtract,
-)
+from replay.sensing.distance.products import accurate_cross, accurate_normal
 
 _LATERAL = 4.0 * EPSILON
 """A plane candidate this far outside an edge, as part of the farthest corner, is taken as on it: it was rounded."""
@@ -45,14 +37,14 @@ _SLIVER = 1e-4
 
 
 @kernel
-def _beside(p: Vector, corner: Vector, e: Vector, normal: Vector, slack: float) -> bool:
+def _beside(p: Triple, corner: Triple, e: Triple, normal: Triple, slack: float) -> bool:
     """Return whether p, in the triangle's plane, lies outside the edge e at `corner` by more than the slack [m]."""
-    side = dot(normal, cross(e, subtract(p, corner)))
+    side = dot(normal, cross(e, minus(p, corner)))
     return side < 0.0 and side * side > slack * slack * dot(e, e)
 
 
 @kernel
-def _in_triangle(p: Vector, a: Vector, b: Vector, c: Vector, normal: Vector, slack: float) -> bool:
+def _in_triangle(p: Triple, a: Triple, b: Triple, c: Triple, normal: Triple, slack: float) -> bool:
     """Return whether p, in the plane of a b c with that unit normal, lies in the triangle or within the slack [m].
 
     Beyond the tip of a needle p may be far away and yet within the slack of both edges' lines; its coordinates tell.
@@ -60,15 +52,15 @@ def _in_triangle(p: Vector, a: Vector, b: Vector, c: Vector, normal: Vector, sla
     for k in range(3):
         if p[k] < min(a[k], b[k], c[k]) - slack or p[k] > max(a[k], b[k], c[k]) + slack:
             return False
-    if _beside(p, a, subtract(b, a), normal, slack):
+    if _beside(p, a, minus(b, a), normal, slack):
         return False
-    if _beside(p, b, subtract(c, b), normal, slack):
+    if _beside(p, b, minus(c, b), normal, slack):
         return False
-    return not _beside(p, c, subtract(a, c), normal, slack)
+    return not _beside(p, c, minus(a, c), normal, slack)
 
 
 @kernel
-def _border_ray(n: Vector, v: Vector, cos_half: float, sin_half: float) -> Vector:
+def _border_ray(n: Triple, v: Triple, cos_half: float, sin_half: float) -> Triple:
     """Return the unit vector on the cone's border that is closest to n; any one of them when n is -v."""
     k = accurate_cross(n, v)
     length = norm(k)
@@ -79,7 +71,7 @@ def _border_ray(n: Vector, v: Vector, cos_half: float, sin_half: float) -> Vecto
 
 
 @kernel
-def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[float, Vector, int]:
+def closest_on_triangle(a: Triple, b: Triple, c: Triple, cone: Cone) -> tuple[float, Triple, int]:
     """Return distance [m] (inf when none), point and case of the triangle's closest point to the origin in the cone.
 
     Args:
@@ -103,8 +95,8 @@ def closest_on_triangle(a: Vector, b: Vector, c: Vector, cone: Cone) -> tuple[fl
         return 0.0, (0.0, 0.0, 0.0), CORNER
 
     # Plane
-    ab, ac = subtract(b, a), subtract(c, a)
-    bc = subtract(c, b)
+    ab, ac = minus(b, a), minus(c, a)
+    bc = minus(c, b)
     longest = max(dot(ab, ab), dot(ac, ac), dot(bc, bc))
     area = accurate_cross(ab, ac)
     squared = dot(area, area)

@@ -17,13 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics import cholesky
 from replay.sensing.electrostatics.products import products
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +38,7 @@ class Response:
     charges: Floats
 
 
-def response(upper: Floats, phi: Floats, shape: Ints, body: Ints, earth: Floats) -> Response:
+def response(upper: Floats, phi: Floats, shape: Integers, body: Integers, earth: Floats) -> Response:
     """Return what bodies change.
 
     Args:

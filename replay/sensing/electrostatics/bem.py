@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arrays import Floats
 from replay.sensing.electrostatics import cholesky
 from replay.sensing.electrostatics.algebra import Response, response
 from replay.sensing.electrostatics.influence import fill_influences
@@ -24,8 +24,6 @@ from replay.sensing.electrostatics.panels import Panels, joined
 from replay.sensing.electrostatics.placement import Placement
 from replay.sensing.electrostatics.refinement import near_tree, refined
 from replay.sensing.electrostatics.unit import Unit
-
-Floats = NDArray[np.float64]
 
 LEVELS = (1.5, 1.06, 0.75)
 """Finenesses of the meshes for a pose."""

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.tree import Tree, triangle_tree
+from replay.numerics.arrays import Floats
 from replay.sensing.electrostatics.faces import Faces, faces_of
 from replay.sensing.electrostatics.grading import graded
 from replay.sensing.electrostatics.panels import Panels, joined
 from replay.sensing.electrostatics.refinement import bounded, point_sample
-
-Floats = NDArray[np.float64]
 
 _CELLS = 9.0
 _LARGEST, _SHARE = 0.13, 1.0 / 3.0

@@ -12,11 +12,9 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel, leaf_kernel
-
-Floats = NDArray[np.float64]
 
 _STRIP = 8
 _BLOCK = 64

@@ -14,12 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import boolean, float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entry, kernel
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @kernel

@@ -13,16 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics.body import Body
 from replay.sensing.electrostatics.unit import Electrode, Unit
 from replay.sensing.target import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 FOUR_PI_EPSILON = 1.1126500560536183e-10
 """[F/m], 4 pi times the vacuum's permittivity, CODATA 2018."""
@@ -48,14 +45,14 @@ class Station:
     """
 
     link: int
-    sensors: Ints
+    sensors: Integers
     plates: tuple[Floats, ...]
     behind: Floats
     driven: bool
     unit: Unit
     bodies: tuple[Body, ...]
     links: tuple[int, ...]
-    objects: Ints
+    objects: Integers
 
     @property
     def has_back(self) -> bool:

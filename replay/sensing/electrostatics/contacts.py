@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry.containment import each_inside
 from replay.numerics import transforms
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.conductors import Station
 from replay.sensing.electrostatics.gap import gaps
 from replay.sensing.electrostatics.placement import RESOLVED, TOUCHING, Placement
 from replay.sensing.target import Target
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 NEAR = 5e-3
 """Gaps are known exactly below this [m]; beyond, they do not matter."""
@@ -38,7 +35,7 @@ class Stand:
     touching: Flags
 
     @property
-    def states(self) -> NDArray[np.int64]:
+    def states(self) -> Integers:
         """What does not change within a motion, as a number (n,): what touches, what is resolved or cut."""
         numbers: dict[tuple[bytes, ...], int] = {}
         rows = zip(self.touching, self.unresolved, self.placements, strict=True)
@@ -99,7 +96,7 @@ def _holds(station: Station, target: Target, inverse: Floats) -> Flags:
     return result
 
 
-def _conductors(station: Station, T: Floats) -> NDArray[np.int64]:
+def _conductors(station: Station, T: Floats) -> Integers:
     """Return the conductor (n, bodies) that each body is part of: bodies that touch are one."""
     n, count = T.shape[:2]
     result = np.tile(np.arange(count), (n, 1))
@@ -119,10 +116,10 @@ def _conductors(station: Station, T: Floats) -> NDArray[np.int64]:
 def _placed(
     station: Station,
     targets: list[Target],
-    body_of: NDArray[np.int64],
+    body_of: Integers,
     T: Floats,
     gap: Floats,
-    conductors: NDArray[np.int64],
+    conductors: Integers,
     least: float,
 ) -> Placement:
     """Return a pose as it is solved."""

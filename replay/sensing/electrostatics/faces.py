@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics.panels import Panels, make_panels
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _SAME = 1e-9
 """Corners closer than this share of the extent are one."""
@@ -70,7 +67,7 @@ def faces_of(triangles: Floats) -> Faces:
     return Faces(panels, _edges(panels, keys, corners[alone]))
 
 
-def _counted_once(triangles: Floats) -> tuple[Floats, Ints]:
+def _counted_once(triangles: Floats) -> tuple[Floats, Integers]:
     """Return the triangles (n, 3, 3) that count, longest edge first, and the numbers (n, 3) of their corners."""
     lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
     longest = np.argmax(lengths, axis=1)
@@ -88,7 +85,7 @@ def _counted_once(triangles: Floats) -> tuple[Floats, Ints]:
     return triangles[kept], corners[kept]
 
 
-def _pairs(triangles: Floats, corners: Ints) -> tuple[Ints, Ints]:
+def _pairs(triangles: Floats, corners: Integers) -> tuple[Integers, Integers]:
     """Return pairs of triangles that make a parallelogram across the longest edge of both."""
     order = np.lexsort((*np.sort(corners[:, :2], axis=1).T,))
     keys = np.sort(corners[order][:, :2], axis=1)
@@ -103,7 +100,7 @@ def _pairs(triangles: Floats, corners: Ints) -> tuple[Ints, Ints]:
     return first[good], second[good]
 
 
-def _edges(panels: Panels, keys: Ints, triangles: Ints) -> Floats:
+def _edges(panels: Panels, keys: Integers, triangles: Integers) -> Floats:
     """Return the exponents at the edges of all faces; keys (m, 4, 2) are the corners of the parallelograms."""
     m = len(keys)
     result = np.full((len(panels.area), 4), SMOOTH)

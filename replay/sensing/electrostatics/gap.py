@@ -11,14 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.geometry.closest import distance_to_surface
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.numerics.triples import Triple, along, cross, dot, minus
-
-Floats = NDArray[np.float64]
 
 
 class Gap(NamedTuple):
@@ -181,7 +179,7 @@ def gaps(surface: Floats, T_body_surface: Floats, triangles: Floats, tree: Tree,
 
 @entry(float64[:, ::1], float64[:, :, ::1], TREE_TYPE, float64)
 @kernel
-def on_surface(points: Floats, triangles: Floats, tree: Tree, within: float) -> NDArray[np.bool_]:
+def on_surface(points: Floats, triangles: Floats, tree: Tree, within: float) -> Flags:
     """Return which points (n, 3) are no farther than `within` [m] from triangles (m, 3, 3) under their tree."""
     result = np.empty(len(points), np.bool_)
     for k in range(len(points)):

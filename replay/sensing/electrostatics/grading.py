@@ -10,12 +10,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.sensing.electrostatics.faces import OPEN, SMOOTH, Faces
 from replay.sensing.electrostatics.panels import Panels, chosen, joined, make_panels
-
-Floats = NDArray[np.float64]
 
 
 def nodes(divisions: int, low: float, high: float) -> Floats:

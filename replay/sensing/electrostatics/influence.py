@@ -20,14 +20,12 @@ import math
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.inverse_distance import mean_over_segment
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.numerics.triples import Triple, along, cross, dot, minus, norm
 from replay.sensing.electrostatics.panels import PANELS_TYPE, Panels
-
-Floats = NDArray[np.float64]
 
 FAR = 10.0
 _MIDDLE = 2.5

@@ -21,13 +21,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.bem import Reading
 from replay.sensing.electrostatics.spline import spline
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Solve = Callable[[int], Reading | None]
 
 _FIRST_KEYS = 5
@@ -51,10 +49,10 @@ class Between:
     increase: Floats
     error: Floats
     shares: Floats
-    solved: NDArray[np.bool_]
+    solved: Flags
 
 
-def pieces(points: Floats, state: NDArray[np.int64]) -> list[tuple[int, int]]:
+def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
     """Return where motions begin and end: frames (first, last), each frame in one or, at a kink, in two.
 
     Args:

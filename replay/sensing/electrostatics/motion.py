@@ -6,14 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.bem import Reading
 from replay.sensing.electrostatics.contacts import Stand
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +22,7 @@ class Track:
     """
 
     poses: Floats
-    pose_of: Ints
+    pose_of: Integers
 
     @staticmethod
     def every(T: Floats) -> Track:
@@ -78,7 +74,7 @@ class Solved:
         none = np.array([reading is None for reading in readings], dtype=np.bool_)
         return Solved(increase, error, shares, stand.touching, stand.unresolved | none)
 
-    def __getitem__(self, index: Ints) -> Solved:
+    def __getitem__(self, index: Integers) -> Solved:
         """Return the frames of an index."""
         return Solved(
             self.increase[index], self.error[index], self.shares[index], self.touching[index], self.unresolved[index]

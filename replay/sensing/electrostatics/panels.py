@@ -7,12 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import boolean, float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import record
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class Panels(NamedTuple):
@@ -66,9 +63,10 @@ def joined(parts: Sequence[Panels]) -> Panels:
     return Panels(*arrays)
 
 
-def chosen(panels: Panels, which: NDArray[np.intp] | Flags) -> Panels:
+def chosen(panels: Panels, which: Integers | Flags) -> Panels:
     """Return the panels of an index or mask."""
-    return Panels(*(np.ascontiguousarray(array[which]) for array in panels))
+    arrays: list[Any] = [np.ascontiguousarray(array[which]) for array in panels]
+    return Panels(*arrays)
 
 
 def moved(panels: Panels, T: Floats) -> Panels:

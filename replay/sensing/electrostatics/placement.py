@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics.body import Body
 from replay.sensing.electrostatics.gap import on_surface
 from replay.sensing.electrostatics.panels import Panels, chosen, moved
@@ -22,8 +22,6 @@ from replay.sensing.electrostatics.panels import Panels, chosen, moved
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TOUCHING = 1e-6
 """Surfaces that come nearer than this [m] touch."""
@@ -46,7 +44,7 @@ class Placement:
 
     bodies: Sequence[Body]
     poses: Sequence[Floats]
-    conductors: Ints
+    conductors: Integers
     gap: float
     cut: bool = False
 
@@ -58,12 +56,12 @@ class Placement:
         return result
 
     @cached_property
-    def body_of_shape(self) -> Ints:
+    def body_of_shape(self) -> Integers:
         """The body (shapes,) of each shape."""
         return np.repeat(np.arange(len(self.bodies)), [len(body.shapes) for body in self.bodies])
 
     @property
-    def conductor_of_shape(self) -> Ints:
+    def conductor_of_shape(self) -> Integers:
         """The conductor (shapes,) of each shape."""
         return np.asarray(self.conductors[self.body_of_shape])
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-
-Floats = NDArray[np.float64]
 
 
 @entry(float64[:, ::1], float64[:, ::1])

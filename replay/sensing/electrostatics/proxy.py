@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.geometry.closest import distance_to_surface
 from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
 from replay.sensing.electrostatics.body import Body
 from replay.sensing.electrostatics.influence import point_potentials
@@ -16,8 +16,6 @@ from replay.sensing.electrostatics.panels import joined
 from replay.sensing.electrostatics.placement import RESOLVED, Placement
 from replay.sensing.electrostatics.refinement import bounded
 from replay.sensing.electrostatics.unit import Unit
-
-Floats = NDArray[np.float64]
 
 _PIECE = 0.025
 """Diameter of the pieces of bodies [m]."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.sensing.electrostatics.panels import Panels, chosen, halved, joined
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
 
 _MOST_ROUNDS = 60
 """Each round halves what is too large: far more than any size asks for."""

@@ -8,9 +8,8 @@ solved by elimination along the diagonal. Two keys make a line, three a parabola
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from replay.numerics.arrays import Floats
 
 
 def spline(keys: Floats, values: Floats, at: Floats) -> Floats:

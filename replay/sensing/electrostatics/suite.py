@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.geometry import containment
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entries_of
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
@@ -22,9 +22,6 @@ from replay.sensing.electrostatics.keyframes import between_keys, pieces
 from replay.sensing.electrostatics.motion import Solved, Track
 from replay.sensing.electrostatics.proxy import Proxy
 from replay.sensing.target import Target
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _TOLERANCE = 5e-3
 """Largest share of a reading by which a spline between frames that are solved may miss."""
@@ -158,12 +155,13 @@ class ElectrostaticSuite:
             increases = increases + behind * increase[:, :k, k]
             errors = errors + behind * error[:, :k, k]
             shares = shares + behind * solved.shares[:, :, :k, k]
-        saturated = solved.touching.any(axis=2)
+        saturated: Flags = np.asarray(solved.touching.any(axis=2))
         stray = np.array([sensor.stray_capacitance for sensor in own])
         supply = np.array([sensor.supply for sensor in own])
         coupling = np.array([sensor.coupling for sensor in own])
         unresolved = solved.unresolved[:, None] & ~saturated
         shown = np.where(solved.touching, np.inf, np.where(saturated[:, :, None], 0.0, shares.transpose(0, 2, 1)))
+        assert columns.increase is not None and columns.error is not None and columns.unresolved is not None
         columns.per_object[:, at[:, None], station.objects] = shown
         columns.touching[:, at] = columns.saturated[:, at] = saturated
         columns.unresolved[:, at] = unresolved

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.errors import InvalidValue
+from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics import cholesky
 from replay.sensing.electrostatics.faces import OPEN, Faces, faces_of
 from replay.sensing.electrostatics.grading import cut_nodes, graded, grid
@@ -22,9 +22,6 @@ from replay.sensing.electrostatics.influence import fill_influences, mean_potent
 from replay.sensing.electrostatics.panels import Panels, chosen, joined
 from replay.sensing.electrostatics.products import products
 from replay.sensing.electrostatics.refinement import near_tree, point_sample, refined
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CELLS = 9.0
 """Divisions of a plate's edge at fineness 1; at fineness f, CELLS / f."""
@@ -103,7 +100,7 @@ class Unit:
         surface = joined([faces.panels for found in self._faces for faces in found])
         return point_sample(surface, 0.005)
 
-    def mesh(self, fineness: float, *, outlines: bool = True) -> tuple[Panels, Ints]:
+    def mesh(self, fineness: float, *, outlines: bool = True) -> tuple[Panels, Integers]:
         """Return the panels of the unit by itself, and the electrode (n,) of each.
 
         Args:

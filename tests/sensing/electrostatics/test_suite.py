@@ -12,6 +12,7 @@ import replay
 from replay.errors import ReplayError
 from replay.scenario.notes import notes
 from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.electrostatics import bem, unit
 
 SCENARIO = """
 version: 1
@@ -37,6 +38,13 @@ sensors:
     right: {{link: sensor, plates: {{a: {{size: [4 cm, 4 cm], pose: {{xyz: [0.03, 0, 0]}}}}}}, coupling: 10 pF{other}}}
 model: {{capacitive: {{method: bem{model}}}}}
 """
+
+
+@pytest.fixture(autouse=True)
+def coarse_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is asked here is not how exact a reading is."""
+    monkeypatch.setattr(bem, "LEVELS", (3.0, 2.1, 1.5))
+    monkeypatch.setattr(unit, "FINENESSES", (2.0, 1.4))
 
 
 def write(folder: Path, **given: str) -> Path:
@@ -92,12 +100,12 @@ def test_the_voltages_are_those_of_the_network(tmp_path: Path) -> None:
 
 
 def test_too_near_is_unresolved_and_contact_saturates_the_sensor_that_is_touched(tmp_path: Path) -> None:
-    points = "[{time: 0 s, position: 3 mm}, {time: 0.05 s, position: 1 mm}, {time: 0.1 s, position: -1 cm}]"
+    points = "[{time: 0 s, position: 4 mm}, {time: 0.05 s, position: 1 mm}, {time: 0.1 s, position: -1 cm}]"
     found = read(tmp_path, duration="0.1 s", points=points)
     assert found.unresolved is not None and found.increase is not None and found.error is not None
     assert found.unresolved.tolist() == [[False, False], [True, True], [False, True]]
     assert found.saturated.tolist() == [[False, False], [False, False], [True, False]]
-    assert found.increase[1] == pytest.approx(found.increase[0], rel=1e-6)
+    assert (found.increase[0] < found.increase[1]).all() and (found.increase[1] < 1.5 * found.increase[0]).all()
     assert np.isnan(found.error).tolist() == [[False, False], [True, True], [True, True]]
     assert np.isinf(found.capacitance[2, 0]) and found.output_voltage[2, 0] == 0.0
     assert np.isfinite(found.capacitance[2, 1]) and 0.0 < found.output_voltage[2, 1] < 2.5
@@ -165,4 +173,4 @@ def test_a_recording_has_the_columns_and_one_of_another_method_has_not(tmp_path:
     assert columns["bem"].increase.shape == (1, 2) and not columns["bem"].unresolved.any()
     assert columns["tree"].increase is None and columns["tree"].unresolved is None
     difference = replay.diff(tmp_path / "tree" / "plate.mcap", tmp_path / "bem" / "plate.mcap")
-    assert difference.different
+    assert difference.verdict.name == "DIFFERENT"

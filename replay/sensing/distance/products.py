@@ -1,4 +1,4 @@
-"""3-vectors as tuples for kernels, and the cross products that must not lose digits.
+"""Cross products that must not lose digits.
 
 A cross product of nearly parallel vectors cancels: in plain arithmetic an edge that points almost at the apex has a
 plane whose normal is noise. With a fused multiply-add the rounding error of a product is known exactly, so a difference
@@ -8,7 +8,6 @@ Jeannerod, Louvet and Muller 2013).
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 from typing import Any
 
@@ -16,8 +15,7 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 from replay.numerics.jit import kernel
-
-Vector = tuple[float, float, float]
+from replay.numerics.triples import Triple
 
 
 def fma(x: float, y: float, z: float) -> float:
@@ -42,42 +40,6 @@ def _compiled_fma(x: Any, y: Any, z: Any) -> Any:
 
 
 @kernel
-def dot(a: Vector, b: Vector) -> float:
-    """Return a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def norm(a: Vector) -> float:
-    """Return |a|."""
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-
-
-@kernel
-def subtract(a: Vector, b: Vector) -> Vector:
-    """Return a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@kernel
-def scaled(factor: float, a: Vector) -> Vector:
-    """Return factor a."""
-    return factor * a[0], factor * a[1], factor * a[2]
-
-
-@kernel
-def combined(p: float, a: Vector, q: float, b: Vector) -> Vector:
-    """Return p a + q b."""
-    return p * a[0] + q * b[0], p * a[1] + q * b[1], p * a[2] + q * b[2]
-
-
-@kernel
-def cross(a: Vector, b: Vector) -> Vector:
-    """Return a × b in plain arithmetic; for vectors that are not nearly parallel."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
 def difference_of_products(a: float, b: float, c: float, d: float) -> float:
     """Return a b - c d, right to two units in the last place."""
     cd = c * d
@@ -85,7 +47,7 @@ def difference_of_products(a: float, b: float, c: float, d: float) -> float:
 
 
 @kernel
-def accurate_cross(a: Vector, b: Vector) -> Vector:
+def accurate_cross(a: Triple, b: Triple) -> Triple:
     """Return a × b, each component right to two units in the last place."""
     return (
         difference_of_products(a[1], b[2], a[2], b[1]),
@@ -117,7 +79,7 @@ def _doubled_area(ay: float, az: float, by: float, bz: float, cy: float, cz: flo
 
 
 @kernel
-def accurate_normal(a: Vector, b: Vector, c: Vector) -> Vector:
+def accurate_normal(a: Triple, b: Triple, c: Triple) -> Triple:
     """Return a × b + b × c + c × a, in twice the working precision before it is rounded; for slivers."""
     return (
         _doubled_area(a[1], a[2], b[1], b[2], c[1], c[2]),

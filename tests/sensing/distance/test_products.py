@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 
 from replay.numerics.jit import kernel
-from replay.sensing.distance.vectors import accurate_cross, accurate_normal, fma
+from replay.sensing.distance.products import accurate_cross, accurate_normal, fma
 
 
 def exact(vector):

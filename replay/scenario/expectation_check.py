@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from replay.collision.columns import CollisionColumns, Level
 from replay.language.fields import Part
 from replay.language.node import Place
+from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import Between, PairExpectation
 from replay.scenario.layout import Layout
 from replay.scenario.names import matches
-from replay.scenario.source import Provenance
-from replay.scenario.tallies import Begin, Count, Extremes, Tally, Times, Values
+from replay.scenario.source import ScenarioProvenance
+from replay.scenario.tallies import Begin, Count, Extremes, Tally
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
 
@@ -52,7 +53,7 @@ class _Check:
     text: str
     path: tuple[str | int, ...]
     what: str
-    take: Callable[[_Block], Values]
+    take: Callable[[_Block], Floats]
     state: Tally
 
 
@@ -74,12 +75,12 @@ class ExpectationCheck:
         *,
         clearance: str = "near",
         margin: float = math.inf,
-        provenance: Provenance | None = None,
+        provenance: ScenarioProvenance | None = None,
     ) -> None:
         self._layout = layout
         self._clearance = clearance
         self._margin = margin
-        self._provenance = provenance or Provenance()
+        self._provenance = provenance or ScenarioProvenance()
         self._checks: list[_Check] = []
         for index, expectation in enumerate(expectations):
             if isinstance(expectation, PairExpectation):
@@ -90,7 +91,7 @@ class ExpectationCheck:
                     for expected in kind.expected:
                         self._add_reading(("expect", index), kind.name, expectation, expected)
 
-    def update(self, time_ns: Times, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
+    def update(self, time_ns: Integers, collision: CollisionColumns | None, readings: Mapping[str, Any]) -> None:
         """Take the results of the next n frames, at times (n,) [ns]: of pairs, and of each kind of sensor by name."""
         block = _Block(collision, readings)
         for check in self._checks:
@@ -108,10 +109,10 @@ class ExpectationCheck:
         columns = matching_pairs(self._layout.pairs, expected.pair)
         about = " | ".join(expected.pair)
 
-        def reaches(level: Level) -> Callable[[_Block], Values]:
-            def take(block: _Block) -> Values:
+        def reaches(level: Level) -> Callable[[_Block], Floats]:
+            def take(block: _Block) -> Floats:
                 assert block.collision is not None
-                reached: Values = np.any(block.collision.level[:, columns] >= level, axis=1).astype(np.float64)
+                reached: Floats = np.any(block.collision.level[:, columns] >= level, axis=1).astype(np.float64)
                 return reached
 
             return take
@@ -131,7 +132,7 @@ class ExpectationCheck:
         if expected.clearance is not None:
             least = expected.clearance.min
 
-            def clearance(block: _Block) -> Values:
+            def clearance(block: _Block) -> Floats:
                 assert block.collision is not None
                 part = block.collision.clearance[:, columns]
                 known = block.collision.evaluated[:, columns]
@@ -139,7 +140,7 @@ class ExpectationCheck:
                 values = np.where(block.collision.level[:, columns] == Level.CONTACT, 0.0, values)
                 smallest = np.min(values, axis=1, initial=math.inf)
                 unknown = np.isinf(smallest) | (complete & ~known.all(axis=1) & (smallest > 0.0))
-                result: Values = np.where(unknown, math.nan, smallest)
+                result: Floats = np.where(unknown, math.nan, smallest)
                 return result
 
             complete = self._clearance != "near" or least > self._margin
@@ -153,7 +154,7 @@ class ExpectationCheck:
         asked = getattr(written, expected.what) if expected.inside else written
         here = (*path, expected.what) if expected.inside else path
 
-        def take(block: _Block) -> Values:
+        def take(block: _Block) -> Floats:
             return expected.values(block.readings[kind])[:, column].astype(np.float64)
 
         def add(text: str, where: tuple[str | int, ...], state: Tally) -> None:

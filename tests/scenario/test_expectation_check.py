@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from replay.collision.columns import CollisionColumns, Level
+from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_sources
-from replay.scenario.verdict import ExpectationCheck, matching_pairs
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.distance.columns import Detection, DistanceColumns
 
