@@ -94,7 +94,7 @@ def potential_at(point: Triple, panels: Panels, j: int) -> float:
         total += _edge(b, c, n, height) + _edge(c, d, n, height)
     else:
         total += _edge(b, d, n, height)
-    return total / panels.area[j]
+    return total / panels.area[j]  # type: ignore[no-any-return]
 
 
 @leaf_kernel
