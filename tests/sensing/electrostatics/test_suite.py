@@ -109,7 +109,7 @@ def test_too_near_is_unresolved_and_contact_saturates_the_sensor_that_is_touched
     assert np.isnan(found.error).tolist() == [[False, False], [True, True], [True, True]]
     assert np.isinf(found.capacitance[2, 0]) and found.output_voltage[2, 0] == 0.0
     assert np.isfinite(found.capacitance[2, 1]) and 0.0 < found.output_voltage[2, 1] < 2.5
-    assert found.per_object[2].tolist()[0][0] == np.inf
+    assert found.per_object[2, 0].tolist() == [0.0, np.inf, 0.0]
 
 
 def test_a_plate_inside_a_body_is_saturated(tmp_path: Path) -> None:
