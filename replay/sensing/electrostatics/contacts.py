@@ -41,7 +41,7 @@ class Stand:
         rows = zip(self.touching, self.unresolved, self.placements, strict=True)
         return np.array(
             [
-                numbers.setdefault((t.tobytes(), bytes([u, p.cut]), p.conductors.tobytes()), len(numbers))
+                numbers.setdefault((t.tobytes(), bytes([int(u), int(p.cut)]), p.conductors.tobytes()), len(numbers))
                 for t, u, p in rows
             ],
             dtype=np.int64,

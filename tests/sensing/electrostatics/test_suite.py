@@ -130,6 +130,16 @@ def test_poses_that_repeat_are_solved_once_and_read_the_same_without_savings(tmp
     assert again.increase is not None and (again.increase[0] == first.increase[0]).all()
 
 
+def test_frames_between_those_that_are_solved_are_within_their_error(tmp_path: Path) -> None:
+    points = "[{time: 0 s, position: 12 cm}, {time: 0.8 s, position: 6 cm}, {time: 1 s, position: 6 cm}]"
+    found = read(tmp_path, duration="1 s", points=points)
+    every = read(tmp_path, duration="1 s", points=points, savings=False)
+    assert found.increase is not None and found.error is not None and every.increase is not None
+    assert (np.abs(found.increase - every.increase) <= found.error + 5e-3 * every.increase).all()
+    assert found.per_object.sum(axis=2) == pytest.approx(found.increase, rel=1e-2)
+    assert (found.increase[16:] == found.increase[16]).all()
+
+
 @pytest.mark.parametrize(
     ("sensor", "other", "rule"),
     [
@@ -174,3 +184,17 @@ def test_a_recording_has_the_columns_and_one_of_another_method_has_not(tmp_path:
     assert columns["tree"].increase is None and columns["tree"].unresolved is None
     difference = replay.diff(tmp_path / "tree" / "plate.mcap", tmp_path / "bem" / "plate.mcap")
     assert difference.verdict.name == "DIFFERENT"
+
+
+def test_a_curve_of_the_sensor_itself_is_calibrated_to_the_vacuum_and_its_stray_capacitance(tmp_path: Path) -> None:
+    from replay.scenario.calibration import SensorPath
+    from replay.sensing.calibration import calibrate
+
+    points = "[{time: 0 s, position: 12 cm}, {time: 0.1 s, position: 6 cm}]"
+    path = SensorPath(replay.load(write(tmp_path, duration="0.1 s", points=points)), sensor="left")
+    found = path.integral([0.12, 0.09, 0.06])
+    reading = read(tmp_path, sensor="stray_capacitance: 3 pF, back: [sheet]", duration="0.1 s", points=points)
+    measured = reading.capacitance[:, 0]
+    fit = calibrate(found, measured, quantity="capacitance", coupling=1e-11, offset=True)
+    assert fit.permittivity == pytest.approx(8.8541878e-12, rel=1e-3)
+    assert fit.stray_capacitance == pytest.approx(3e-12, rel=1e-2)
