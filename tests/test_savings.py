@@ -1,6 +1,5 @@
 """With every saving switched off the results are the same."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +39,7 @@ def both(scenario, model=None):
         columns = {}
         for group in ("collision", "distance", "capacitive"):
             if getattr(blocks[0], group) is not None:
-                names = [field.name for field in dataclasses.fields(getattr(blocks[0], group))]
+                names = [field.name for field in getattr(blocks[0], group).present()]
                 for name in names:
                     columns[f"{group}.{name}"] = np.concatenate([getattr(getattr(b, group), name) for b in blocks])
         found.append((simulation, columns))

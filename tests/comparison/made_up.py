@@ -116,8 +116,7 @@ def only_frames(original: Recording, frames: Any) -> Recording:
     """Return a recording of some of the frames."""
 
     def cut(columns: Any) -> Any:
-        values = {field.name: getattr(columns, field.name)[frames] for field in dataclasses.fields(columns)}
-        return type(columns)(**values)
+        return type(columns)(**{field.name: getattr(columns, field.name)[frames] for field in columns.present()})
 
     arrays = ("time", "joint_positions", "joint_velocities", "link_poses", "link_quaternions")
     return dataclasses.replace(
