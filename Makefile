@@ -12,7 +12,7 @@ pip = $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-ch
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run regress accept test lint format type schemas bench pictures soak clean system
+.PHONY: help setup run regress accept freeze test lint format type schemas bench pictures soak plain mutants clean system
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## */\1\t/' | awk -F'\t' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -43,6 +43,9 @@ regress: setup  ## run every scenario and compare it with its accepted recording
 
 accept: setup  ## make the results of `make regress` the accepted ones: make accept REASON='why'
 	$(BIN)/replay accept $(NIGHT) --baseline $(BASELINES) --reason "$(REASON)"
+
+freeze: $(VENV)/.test  ## freeze the readings of methods whose revision was raised
+	$(BIN)/python -m tests.frozen
 
 test: $(VENV)/.test system lint type  ## install what is missing, then lint, types and all tests
 	$(BIN)/python -m pytest -n 2 --dist loadfile
@@ -78,6 +81,13 @@ pictures: $(VENV)/.test system  ## make the README's pictures, two of them from 
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
+
+plain: $(VENV)/.test  ## every test with kernels as plain Python, as in a debugger; those that take long so with fewer cases
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n 2 --dist loadfile
+
+mutants: $(VENV)/.test  ## do the tests notice? planted faults, and 330 mutants over all rooms (hours); goes on where it stopped
+	$(BIN)/python -m tests.mutants.run --planted
+	$(BIN)/python -m tests.mutants.run
 
 system:  # a software Vulkan driver for the viewer; for tests a browser, certificates, and what a process asks the system
 	@ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && \

@@ -16,6 +16,7 @@ from replay.sensing.kinds import KINDS, of_kind
 
 if TYPE_CHECKING:
     from replay.collision.pipeline import CollisionPipeline
+    from replay.kinematics.motion import Motion
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.scenario.scene import Scene
@@ -77,7 +78,8 @@ class Simulation:
 
         self.scene = scene
         self._motion = plan(scene.linkage, scene.script)
-        self.collision = _collision(scene)
+        self._proven = scene.model.collision.between == "proven"
+        self.collision = _collision(scene, self._motion if self._proven else None)
         self.suites: dict[str, Suite] = {
             kind: KINDS[kind].suite(sensors, scene.targets, getattr(scene.model, kind), savings=scene.savings)
             for kind, sensors in scene.sensors.items()
@@ -90,17 +92,20 @@ class Simulation:
     def block(self, first: int) -> FrameBlock:
         """Return the block that begins at a frame; it depends on no other block."""
         last = min(first + BLOCK_FRAMES, self.scene.frames)
-        states = self._motion.states(self.scene.seconds(first, last))
+        lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
+        time = self.scene.time_ns(first - lead, last)
+        states = self._motion.states(time / 1e9)
         poses = self.scene.linkage.forward(states.positions, states.free_poses)
+        shown = poses.slice(lead, len(time))
         return FrameBlock(
             layout=self.scene.layout,
             first=first,
-            time=self.scene.time_ns(first, last),
-            joint_positions=states.positions,
-            joint_velocities=states.velocities,
-            link_poses=poses.world,
-            collision=self.collision.run(poses) if self.collision else None,
-            readings={kind: suite.run(poses) for kind, suite in self.suites.items()},
+            time=time[lead:],
+            joint_positions=states.positions[lead:],
+            joint_velocities=states.velocities[lead:],
+            link_poses=shown.world,
+            collision=self.collision.run(poses, lead=lead, time=time, first=first) if self.collision else None,
+            readings={kind: suite.run(shown) for kind, suite in self.suites.items()},
         )
 
     def blocks(self) -> Iterator[FrameBlock]:
@@ -134,7 +139,7 @@ def simulate(
     yield from Simulation(build(scenario, model=model, savings=savings)).blocks()
 
 
-def _collision(scene: Scene) -> CollisionPipeline | None:
+def _collision(scene: Scene, motion: Motion | None) -> CollisionPipeline | None:
     if not scene.pairs:
         return None
     from replay.collision.pipeline import CollisionPipeline
@@ -150,4 +155,5 @@ def _collision(scene: Scene) -> CollisionPipeline | None:
         clearance=version.clearance,
         margin=scene.margin,
         savings=scene.savings,
+        motion=motion,
     )

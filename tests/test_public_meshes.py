@@ -25,6 +25,8 @@ from replay.sensing.distance import DistanceSensor, DistanceSuite
 from replay.sensing.target import make_target
 from tests import brute_force
 
+pytestmark = pytest.mark.compiled  # meshes of thousands of triangles
+
 PACKAGES = (
     "pyskindose",
     "example-robot-data",

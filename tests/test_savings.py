@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.collision.columns import Crossings
 from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.errors import InvalidValue
@@ -42,6 +43,9 @@ def both(scenario, model=None):
                 names = [field.name for field in getattr(blocks[0], group).present()]
                 for name in names:
                     columns[f"{group}.{name}"] = np.concatenate([getattr(getattr(b, group), name) for b in blocks])
+            if group == "collision":
+                crossings = Crossings.joined([block.collision.crossings for block in blocks])
+                columns |= {f"crossings.{name}": values for name, values in vars(crossings).items()}
         found.append((simulation, columns))
     return found
 
@@ -50,7 +54,7 @@ def compare(columns, others, rtol=0.0):
     """Bit for bit, but for clearances, and for what a tree summed."""
     assert columns.keys() == others.keys()
     for name, values in columns.items():
-        if name == "collision.clearance":
+        if name in ("collision.clearance", "collision.clearance_bound"):
             np.testing.assert_allclose(values, others[name], **CLEARANCE, err_msg=name)
         elif rtol and name.startswith("capacitive.") and values.dtype == np.float64:
             # a voltage is smoother than its capacitance; the delta output is at most as sensitive as it, relative to it
@@ -60,6 +64,7 @@ def compare(columns, others, rtol=0.0):
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.compiled
 def test_shipped_scenarios_read_the_same(path):
     for scenario in load_cases(path):
         frames = 37  # 6 Hz, with what stands still for longer than that

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
+from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenResult
@@ -73,6 +74,7 @@ class CaseResult:
         seconds: wall time.
         memory: the most resident memory seen [bytes].
         notes: what a reader should know about the scene.
+        between_frames: contacts that no frame shows, and what is not proven, a line each.
         reused: taken from an earlier run.
         no_space: it failed because the disk is full.
     """
@@ -88,6 +90,7 @@ class CaseResult:
     seconds: float = 0.0
     memory: int = 0
     notes: tuple[str, ...] = ()
+    between_frames: tuple[str, ...] = ()
     reused: bool = False
     no_space: bool = False
 
@@ -104,6 +107,7 @@ class CaseResult:
             ],
             "counters": self.counters,
             "notes": list(self.notes),
+            "between_frames": list(self.between_frames),
         }
 
     @staticmethod
@@ -118,6 +122,7 @@ class CaseResult:
             error=values["error"],
             counters=values["counters"],
             notes=tuple(values["notes"]),
+            between_frames=tuple(values.get("between_frames", ())),
             reused=True,
         )
 
@@ -133,8 +138,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     try:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
-        check = scene.expectation_check()
-        blocks = _checked(simulation.blocks(), check)
+        check, unseen = scene.expectation_check(), Unseen(scene.layout)
+        blocks = _checked(simulation.blocks(), check, unseen)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -156,6 +161,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
         notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
+        between_frames=unseen.lines(),
     )
 
 
@@ -168,11 +174,13 @@ def describe(result: CaseResult) -> list[str]:
     lines = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
     for outcome in result.outcomes:
         lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
+    lines.extend(f"  {line}" for line in result.between_frames)
     lines.extend(f"  note: {note}" for note in result.notes)
     return lines
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck) -> Iterator[FrameBlock]:
+def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen) -> Iterator[FrameBlock]:
     for block in blocks:
         check.update(block.time, block.collision, block.readings)
+        unseen.update(block.collision)
         yield block

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from replay.batch.worker import Messages
+from replay.numerics import remarks
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.sensing.kinds import KINDS
@@ -61,7 +61,11 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
 
         version = model.collision
         found += pipeline.kernels(
-            bounds=version.bounds, narrowphase=version.narrowphase, pieces=version.pieces, savings=savings
+            bounds=version.bounds,
+            narrowphase=version.narrowphase,
+            pieces=version.pieces,
+            savings=savings,
+            between=version.between,
         )
     for name, kind in KINDS.items():
         if name in needs.sensors:
@@ -85,13 +89,15 @@ class PrepareKernels:
 
     def __call__(self, messages: Messages) -> None:
         """Make the kernels of every combination of methods ready; other workers that are asked to help do the same."""
-        from replay.numerics.jit import compile_entries
-        from replay.numerics.jit.progress import tell_by
+        from replay.numerics.jit import compile_entries, progress
 
-        tell_by(messages.progress, messages.tell)
+        progress.tell_by(messages.progress)
+        remarks.tell_by(messages.tell)
         compile_entries(
             [kernel for needs in self.needs for kernel in kernels_for(needs, savings=self.savings)],
             share=messages.share,
         )
         if self.rrd:
-            importlib.import_module("rerun")
+            from replay.recording import rerun_inside
+
+            rerun_inside.available()

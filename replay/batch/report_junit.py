@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -50,11 +51,17 @@ def junit(found: Regression) -> bytes:
         ElementTree.SubElement(properties, "property", {"name": name, "value": clean(value)})
     for item in found.judged:
         _case(suite, found, item)
-    for name in ("system-out", "system-err"):
-        ElementTree.SubElement(suite, name)
+    ElementTree.SubElement(suite, "system-out").text = clean("\n".join(_between_frames(found)))
+    ElementTree.SubElement(suite, "system-err")
     ElementTree.indent(root)
     xml: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return xml + b"\n"
+
+
+def _between_frames(found: Regression) -> Iterator[str]:
+    for item in found.judged:
+        if item.result is not None:
+            yield from (f"{printable(item.name)}: {line}" for line in item.result.between_frames)
 
 
 def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:

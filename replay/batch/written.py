@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NotRequired
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -34,6 +34,7 @@ class WrittenResult(TypedDict):
     expectations: list[WrittenOutcome]
     counters: dict[str, _Count]
     notes: list[str]
+    between_frames: NotRequired[list[str]]
 
 
 class WrittenNight(TypedDict):

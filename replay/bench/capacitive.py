@@ -18,8 +18,8 @@ from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
 from replay.sensing.capacitive import plate_integral
-from replay.sensing.capacitive.clusters import make_clusters
-from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 
 Answer = Callable[[], Floats]

@@ -52,8 +52,8 @@ def _plate(method: str, question: dict[str, Any]) -> list[float]:
 
 def _plate_tree(question: dict[str, Any]) -> list[float]:
     from replay.geometry.tree import triangle_tree
-    from replay.sensing.capacitive.clusters import make_clusters
-    from replay.sensing.capacitive.tree_sum import COUNTS, sum_tree
+    from replay.sensing.capacitive.tree.clusters import make_clusters
+    from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 
     triangles = np.array([question["triangle"]])
     tree = triangle_tree(triangles)

@@ -42,8 +42,8 @@ def validate(scenarios: tuple[Path, ...], deep: bool, patterns: tuple[str, ...],
                 problems.extend(error.problems)
                 continue
             counts |= scene.counts
+            shown.extend(remark for remark in scene.notes if remark not in kept)
             kept = list(scene.notes)
-            shown.extend(kept[len(remarks) :])
         kinds = ((n, what.removesuffix("s").replace("_", " ")) for what, n in counts.items())
         lines.append(", ".join([f"{scenario.name}: valid", *(count(n, kind) for n, kind in kinds)]))
         data.append({"scenario": scenario.name, **counts, "tags": list(scenario.tags), "notes": kept})

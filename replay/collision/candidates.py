@@ -25,7 +25,7 @@ from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
 
 
-def near_pairs(volumes: Volumes, links: Integers, poses: LinkPoses, limit: float) -> Integers:
+def near_pairs(volumes: Volumes, links: Integers, poses: LinkPoses, limit: float, steps: Floats) -> Integers:
     """Return (k, 2) bodies, first < second, that may be within `limit` [m] of each other in a block; others are not.
 
     Args:
@@ -33,13 +33,14 @@ def near_pairs(volumes: Volumes, links: Integers, poses: LinkPoses, limit: float
         links: (B,) the bodies' links.
         poses: of n >= 1 frames.
         limit: distance of interest [m], finite.
+        steps: (B,) added to each body's own distance of interest, half the limit [m].
     """
     lower, upper = np.empty((len(links), 3)), np.empty((len(links), 3))
     depth = max(len(poses.linkage.ancestors(link)) for link in sorted(set(links.tolist())))
     world = np.ascontiguousarray(poses.world)
     largest, defect = _extremes(world)
     inflation = (32.0 + depth * depth) * 2.0**-44 + 4.0 * defect
-    _sweep(world, links, volumes.center, volumes.radius, 0.5 * limit, largest, inflation, lower, upper)
+    _sweep(world, links, volumes.center, volumes.radius, 0.5 * limit + steps, largest, inflation, lower, upper)
     tree = build_tree(lower, upper, leaf_size=4)
     stack, none = np.empty(2 * MAX_DEPTH, dtype=np.int64), np.empty((0, 2), dtype=np.int64)
     found = np.empty((_meeting(tree, lower, upper, stack, none), 2), dtype=np.int64)
@@ -71,7 +72,7 @@ def _extremes(world: Floats) -> tuple[float, float]:
     int64[::1],
     float64[:, ::1],
     float64[::1],
-    float64,
+    float64[::1],
     float64,
     float64,
     float64[:, ::1],
@@ -83,7 +84,7 @@ def _sweep(
     links: Integers,
     center: Floats,
     radius: Floats,
-    margin: float,
+    margin: Floats,
     largest: float,
     inflation: float,
     lower: Floats,
@@ -94,7 +95,7 @@ def _sweep(
         link = links[body]
         c = center[body]
         own = abs(c[0]) + abs(c[1]) + abs(c[2]) + radius[body]
-        reach = radius[body] + margin + inflation * (2.0 * largest + 2.0 * own + margin)
+        reach = radius[body] + margin[body] + inflation * (2.0 * largest + 2.0 * own + margin[body])
         for i in range(3):
             low, high = np.inf, -np.inf
             for f in range(world.shape[0]):

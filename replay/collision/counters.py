@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from replay.collision import broad, narrow, traversal
+from replay.collision import broad, crossing_search, interval_proof, narrow, traversal
 
 
 @dataclass
@@ -29,6 +29,12 @@ class Counters:
         contacts: at level contact.
         contained: contacts of a body wholly inside another.
         undecided: at level contact because GJK reached its accuracy limit.
+        intervals: between frames, of pairs that were looked at there; those of the rest are clear by the same bounds.
+        intervals_by_block: of those, proven for the whole block at once.
+        intervals_by_frames: proven by what is known at their ends.
+        intervals_searched: in doubt, and searched.
+        moments: poses between frames that the search looked at.
+        moment_queries: pairs of convex sets decided there.
     """
 
     pairs: int = 0
@@ -47,6 +53,21 @@ class Counters:
     contacts: int = 0
     contained: int = 0
     undecided: int = 0
+    intervals: int = 0
+    intervals_by_block: int = 0
+    intervals_by_frames: int = 0
+    intervals_searched: int = 0
+    moments: int = 0
+    moment_queries: int = 0
+
+    def add_intervals(self, proven: Sequence[int], searched: Sequence[int]) -> None:
+        """Add the counts of `interval_proof.certify` and of `crossing_search.search`."""
+        self.intervals += sum(proven)
+        self.intervals_by_block += proven[interval_proof.BY_BLOCK]
+        self.intervals_by_frames += proven[interval_proof.BY_FRAMES]
+        self.intervals_searched += proven[interval_proof.IN_DOUBT]
+        self.moments += searched[crossing_search.MOMENTS]
+        self.moment_queries += searched[traversal.QUERIES]
 
     def add(self, sieved: Sequence[int], decided: Sequence[int]) -> None:
         """Add the counts of `broad.sieve` and of the narrow phase."""

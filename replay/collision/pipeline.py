@@ -9,24 +9,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from replay.collision import broad, candidates, narrow, relative, scan, support, traversal
+from replay.collision import (
+    broad,
+    candidates,
+    crossing_search,
+    interval_proof,
+    narrow,
+    relative,
+    scan,
+    support,
+    traversal,
+    ways,
+)
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
-from replay.collision.columns import MARGIN, CollisionColumns, CollisionEntries
+from replay.collision.columns import MARGIN, Between, CollisionColumns, CollisionEntries, Crossings
 from replay.collision.counters import Counters
+from replay.collision.intervals import Course, Intervals, Known
 from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.relative import RelativePoses
 from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
 from replay.geometry import box_search, calipers, decomposition, principal_axes, smallest_ball, tree
+from replay.kinematics import travel
 from replay.kinematics.linkage import Linkage, LinkPoses
+from replay.kinematics.motion import Motion
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 from replay.numerics.jit import entries_of
 
@@ -40,12 +54,21 @@ FEW_PAIRS = 512
 """Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
 
 
-def kernels(*, bounds: Bounds, narrowphase: str, pieces: Pieces, savings: bool = True) -> tuple[Any, ...]:
-    """Return the kernels that a pipeline with these options calls; see `CollisionPipeline`."""
+def kernels(
+    *, bounds: Bounds, narrowphase: str, pieces: Pieces, savings: bool = True, between: str = "sampled"
+) -> tuple[Any, ...]:
+    """Return the kernels that a pipeline with these options calls; see `CollisionPipeline`.
+
+    Args:
+        bounds, narrowphase, pieces, savings: its options.
+        between: "proven" if it has a motion, else "sampled".
+    """
     used = [tree, support, relative, candidates]
     used += {"sphere": [smallest_ball], "aabb": []}.get(bounds, [principal_axes, box_search, calipers])
     used += [decomposition] if pieces == "convex" else []
     used += [traversal] if narrowphase == "fcl" else [narrow if savings else scan]
+    if between == "proven":
+        used += [travel, ways, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
     return (*entries_of(*used), broad.sieve if savings else broad.keep_all)
 
 
@@ -73,6 +96,8 @@ class CollisionPipeline:
         savings: False decides every listed pair in every frame anew: no bodies, blocks or frames are ruled out by
             bounding volumes, nothing is taken from another frame, all convex sets of two bodies are compared, and
             clearances are computed however far. The columns are the same, clearances within their accuracy.
+        motion: of the linkage; contacts between frames are proven absent or found by it, see `intervals`. Without it
+            the frames are all that is looked at.
 
     Raises:
         InvalidValue: an unknown option, a margin that is not finite and positive, a pair that is listed twice, or
@@ -92,6 +117,7 @@ class CollisionPipeline:
         clearance: Literal["never", "near", "always"] = "near",
         margin: float = MARGIN,
         savings: bool = True,
+        motion: Motion | None = None,
     ) -> None:
         if clearance not in ("never", "near", "always"):
             raise InvalidValue("clearance", clearance, "must be one of never, near, always")
@@ -117,23 +143,46 @@ class CollisionPipeline:
         self._links = np.array([body.link for body in chosen], dtype=np.int64)
         self._place = np.full(len(bodies), -1, dtype=np.int64)
         self._place[self._used] = np.arange(len(chosen))
-        self._all: Selected | None = None  # what every block looks at, where that is all pairs
-        if isinstance(self._pairs, Listed) and (self._pairs.count <= FEW_PAIRS or clearance == "always" or not savings):
-            self._all = self._pairs.all()
-            self._always = self._batches(self._all.moving())
         self._static: list[_Found] | None = None
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
             self.narrow_phase = _engine(narrowphase, chosen, arrays, savings)
+        # between frames distances are our own, whatever decides at the frames
+        self._own = partial(narrow.decide, arrays) if chosen and narrowphase == "fcl" else None
+        self._cap = math.inf if clearance == "always" else float(margin)
+        self._intervals: Intervals | None = None
+        if chosen and motion is not None:
+            self._intervals = Intervals(
+                linkage,
+                motion,
+                arrays,
+                self._volumes,
+                self._links,
+                limit=self._limit,
+                cap=self._cap,
+                savings=savings,
+                counters=self.counters,
+            )
+        self._all: Selected | None = None  # what every block looks at, where that is all pairs
+        if isinstance(self._pairs, Listed) and (self._pairs.count <= FEW_PAIRS or clearance == "always" or not savings):
+            self._all = self._pairs.all()
+            self._always = self._batches(self._all.moving())
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """The listed pairs, in the columns' order; empty if rules were given."""
         return self._pairs.listed
 
-    def run(self, poses: LinkPoses) -> CollisionColumns:
+    def run(self, poses: LinkPoses, *, lead: int = 0, time: Integers | None = None, first: int = 0) -> CollisionColumns:
         """Return the columns of a block of n frames; they depend on no other block.
+
+        Args:
+            poses: of its frames, after `lead` frames that come before it.
+            lead: 0 or 1, how many frames before the block there are.
+            time: (lead + n,) [ns] of the frames. What is between them is looked at if the pipeline has a motion, and is
+                told when they are.
+            first: frame of the scenario that the block begins at; `crossings` count from frame 0 of it.
 
         Raises:
             InvalidValue: a pose is not finite, or the pairs were given as rules: they have no columns.
@@ -141,23 +190,36 @@ class CollisionPipeline:
         Accuracy: a clearance is right to 1e-12 of itself plus 1e-14 of the bodies' reach and offset
         (tests/collision/test_pipeline.py); levels are decided as `gjk.intersect` does, for the poses as they are
         computed: bodies that are written to touch may be 1e-16 of the way between them apart, and read that clearance,
-        not contact.
+        not contact. What is said of intervals is proven (tests/collision/test_intervals.py).
         """
         if isinstance(self._pairs, Ruled):
             raise InvalidValue("pairs", "rules", "columns need listed pairs; ask `contacts` instead")
-        shape = (len(poses.local), self._pairs.count)
+        shape = (len(poses.local) - lead, self._pairs.count)
         columns = CollisionColumns(
             level=np.zeros(shape, dtype=np.uint8),
             clearance=np.full(shape, np.nan),
             evaluated=np.zeros(shape, dtype=bool),
             undecided=np.zeros(shape, dtype=bool),
+            between=np.broadcast_to(np.uint8(Between.NOT_LOOKED), shape),
+            clearance_bound=np.broadcast_to(np.nan, shape),
         )
-        for found in self._evaluate(poses):
+        course = None
+        if self._intervals is not None and time is not None and len(time) > 1:
+            course = self._intervals.course(poses, lead, time, first)
+            between, bound = self._intervals.clear(shape, course)
+            columns = replace(columns, between=between, clearance_bound=bound)
+        crossings = []
+        for found in self._evaluate(poses, lead, course):
             columns.level[:, found.columns] = found.level
             columns.clearance[:, found.columns] = found.clearance
             columns.evaluated[:, found.columns] = ~np.isnan(found.clearance)
             columns.undecided[:, found.columns] = found.undecided
-        return columns
+            if course is not None and found.known is not None:
+                known = slice(course.begin - shape[0], None)  # of those that cannot move there is one row
+                between[course.begin :, found.columns] = found.known.between[known]
+                bound[course.begin :, found.columns] = found.known.bound[known]
+                crossings.append(found.known.crossings.of(found.columns))
+        return replace(columns, crossings=Crossings.joined(crossings))
 
     def contacts(self, poses: LinkPoses) -> CollisionEntries:
         """Return what `run` does without the clear pairs and frames: memory and time grow with those that are near.
@@ -171,7 +233,7 @@ class CollisionPipeline:
         frame, bodies = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)]
         level, clearance = [np.zeros(0, dtype=np.uint8)], [np.zeros(0)]
         undecided = [np.zeros(0, dtype=bool)]
-        for found in self._evaluate(poses):
+        for found in self._evaluate(poses, 0, None):
             near = np.broadcast_to((found.level > 0) | ~np.isnan(found.clearance), (n, found.level.shape[1]))
             f, p = np.nonzero(near)
             source = np.minimum(f, len(found.level) - 1)
@@ -190,9 +252,9 @@ class CollisionPipeline:
             undecided=np.concatenate(undecided)[order],
         )
 
-    def _evaluate(self, poses: LinkPoses) -> Iterator[_Found]:
+    def _evaluate(self, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
         """Yield what is known of all pairs that may be near in a block, of those that cannot move as one frame."""
-        n = len(poses.local)
+        n = len(poses.local) - lead
         if not np.isfinite(poses.local).all():
             frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
             place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
@@ -201,26 +263,39 @@ class CollisionPipeline:
         if n == 0 or self._pairs.count == 0:
             return
         if self._static is None:
-            first = poses.slice(0, 1)
+            still = None if self._intervals is None else self._intervals.still()
+            one = poses.slice(0, 1)
             self._static = []
             if self._pairs.static_count:
-                fixed = self._candidates(first).fixed()
+                fixed = self._candidates(one, still).fixed()
                 self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
-                self._static = [self._work(batch, first) for batch in self._batches(fixed)]
+                self._static = [self._work(batch, one, 0, still) for batch in self._batches(fixed)]
         self.counters.static += n * self._pairs.static_count
         yield from self._static
         if self._all is None:
-            moving = self._candidates(poses).moving()
+            moving = self._candidates(poses, course).moving()
             self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
         for batch in self._always if self._all is not None else self._batches(moving):
-            yield self._work(batch, poses)
+            yield self._work(batch, poses, lead, course)
 
-    def _candidates(self, poses: LinkPoses) -> Selected:
+    def _candidates(self, poses: LinkPoses, course: Course | None) -> Selected:
         if self._all is not None:
             return self._all
-        return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, self._limit)])
+        reach, limit = np.zeros(len(self._links)), self._limit
+        if course is not None and self._intervals is not None:
+            reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
+        return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _work(self, batch: _Batch, poses: LinkPoses) -> _Found:
+    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> _Found:
+        frames = self._decided(batch, poses.slice(lead, len(poses.local)))
+        known = None
+        if course is not None and self._intervals is not None:
+            head = self._decided(batch, poses.slice(0, 1)) if lead else None
+            known = self._intervals.answer(frames, head, batch.ways, course)
+        return _Found(batch.columns, batch.rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+
+    def _decided(self, batch: _Batch, poses: LinkPoses) -> PairFrames:
+        """Return what is found of a batch's pairs in frames."""
         relative = batch.relative.of(poses.local)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
@@ -238,7 +313,7 @@ class CollisionPipeline:
         if not self._savings:
             frames.clearance[frames.clearance > self._limit] = np.nan
         self.counters.add(sieved.tolist(), decided.tolist())
-        return _Found(batch.columns, batch.rows[:, :2], frames.level, frames.clearance, frames.undecided)
+        return frames
 
     def _batches(self, chosen: Selected) -> list[_Batch]:
         """Return pairs in batches that share link pairs."""
@@ -257,20 +332,27 @@ class CollisionPipeline:
             _, first, q = np.unique(number[part], return_index=True, return_inverse=True)
             bases, base = np.unique(links[part, 0], return_inverse=True)
             table = np.stack([rows[part, 0], rows[part, 1], q, base if self._uses_world else 0 * base], axis=1)
-            ways = RelativePoses(self._linkage, links[part][first])
-            batches.append(_Batch(columns[part], table, ways, bases))
+            places = RelativePoses(self._linkage, links[part][first])
+            rise = np.zeros((0, 4), dtype=np.int64)
+            if self._intervals is not None:
+                rise = self._intervals.rows(rows[part])
+            batches.append(_Batch(columns[part], table, places, bases, rise))
             begin = end
         return batches
 
 
 @dataclass(frozen=True, eq=False)
 class _Batch:
-    """Pairs evaluated together: `rows` for `broad.sieve`, their relative poses, the links of their first bodies."""
+    """Pairs evaluated together: `rows` for `broad.sieve`, their relative poses, the links of their first bodies.
+
+    `ways` are the rows of `intervals.Course.ways`, none if nothing is asked of intervals.
+    """
 
     columns: Integers
     rows: Integers
     relative: RelativePoses
     bases: Integers
+    ways: Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,6 +364,7 @@ class _Found:
     level: Bytes
     clearance: Floats
     undecided: Flags
+    known: Known | None
 
 
 def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings: bool) -> NarrowPhase:

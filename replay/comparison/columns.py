@@ -11,6 +11,7 @@ import numpy as np
 
 from replay.comparison import difference as result
 from replay.comparison.events import Matched, StateTrack, match, tracks
+from replay.comparison.moments import Moments
 from replay.comparison.numbers import Errors, compare_numbers, compare_rotations
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.signals import Group, Signal, unify_categories
@@ -46,6 +47,11 @@ class MatchedFrames:
     def _moment(self, rows: Integers | None, index: int) -> result.Moment:
         return result.Moment(int(index if rows is None else rows[index]), float(self.time[index]) / SECOND)
 
+    def known(self, a: Moments | None, b: Moments | None) -> tuple[Moments | None, Moments | None]:
+        """Return what the baseline and the candidate know of moments, by the matched frames."""
+        count = len(self.time)
+        return a and a.in_rows(self.baseline, count), b and b.in_rows(self.candidate, count)
+
 
 Finding = Callable[[Signal, Rule | None], result.SignalDifference]
 """A difference that waits for the signal and the rule that it is told of."""
@@ -68,6 +74,10 @@ def compare_groups(
     columns_a = np.array([k for k, _ in common], dtype=np.int64)
     columns_b = np.array([k for _, k in common], dtype=np.int64)
     changed = _changed(values_a, values_b, frames, columns_a, columns_b)
+    known_a, known_b = frames.known(a.moments, b.moments)
+    for known, columns in ((known_a, columns_a), (known_b, columns_b)):
+        if known is not None:  # what one knows better may differ where the columns do not
+            changed |= np.isin(columns, known.column)
     for (k, j), differs in zip(common, changed.tolist(), strict=True):
         signal = a.signals[k]
         rule = rules.rule(signal.full_name)
@@ -81,7 +91,9 @@ def compare_groups(
             continue
         echo = _echo(gates, signal, a.field)
         if a.field.kind.is_state:
-            found = _compare_states(a.field, x, y, categories, frames, tolerance, echo)
+            better = known_a and known_a.of(k), known_b and known_b.of(j)
+            of = partial(tracks, known=better, between=a.between and b.between)
+            found = _compare_states(of, a.field, x, y, categories, frames, tolerance, echo)
         else:
             compare = compare_rotations if a.field.kind is Kind.ROTATION else compare_numbers
             found = _summarise(compare(x, y, tolerance), x, y, frames, echo, a.field.kind)
@@ -166,6 +178,7 @@ def _summarise(
 
 
 def _compare_states(
+    of: Callable[..., Iterator[StateTrack]],
     field: Field,
     x: Column,
     y: Column,
@@ -180,7 +193,7 @@ def _compare_states(
     events: list[result.EventDifference] = []
     count = outside = lone = 0
     max_shift, max_frames = 0.0, 0
-    for track in tracks(field, x, y, categories):
+    for track in of(field, x, y, categories, time=frames.time[kept]):
         matched = match(track)
         shifts = _Shifts.of(matched, frames, kept, tolerance)
         count += len(matched.state)
@@ -201,7 +214,7 @@ def _compare_states(
         decides=outside > 0,
         frames=len(differing),
         outside=outside,
-        first=first or frames.baseline_moment(int(kept[differing[0]])),
+        first=first or events[0].baseline or events[0].candidate or _START,
         echo=echoes,
         events=tuple(events[: result.LISTED_EVENTS]),
         event_count=count,
@@ -212,6 +225,11 @@ def _compare_states(
 
 
 _START = result.Moment(0, 0.0)
+
+
+def _at(moment: result.Moment, time: int) -> result.Moment:
+    """Return a moment with the frame of another, at its own time [ns]."""
+    return result.Moment(moment.frame, float(time) / SECOND)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,12 +243,14 @@ class _Shifts:
     def of(matched: Matched, frames: MatchedFrames, kept: Integers, tolerance: Tolerance) -> _Shifts:
         paired = (matched.baseline >= 0) & (matched.candidate >= 0)
         from_, to = kept[matched.baseline], kept[matched.candidate]
-        nanoseconds = frames.time[to] - frames.time[from_]
+        nanoseconds = np.where(matched.finer, matched.gap, frames.time[to] - frames.time[from_])
         count = np.abs(to - from_)
         # two frames' times are rounded to nanoseconds: what lies between them is known to 1 ns
-        limit = tolerance.time * SECOND + 1.0 if tolerance.time > 0.0 else 0.0
-        allowed = paired & ((np.abs(nanoseconds) <= limit) | (count <= tolerance.frames))
-        return _Shifts(paired, nanoseconds / SECOND, to - from_, allowed)
+        limit = tolerance.time * SECOND + 1.0 if tolerance.time > 0.0 else -1.0
+        within = (np.abs(nanoseconds) <= limit) | ((tolerance.frames > 0) & (count <= tolerance.frames))
+        if tolerance.bracket is not None:
+            within = np.where(matched.finer, np.abs(nanoseconds) <= tolerance.bracket * SECOND, within)
+        return _Shifts(paired, nanoseconds / SECOND, to - from_, paired & within)
 
 
 def _listed(
@@ -244,8 +264,8 @@ def _listed(
             result.EventDifference(
                 what=track.label(int(matched.state[k])),
                 fate=result.Fate.SHIFTED if paired else result.Fate.VANISHED if in_a >= 0 else result.Fate.APPEARED,
-                baseline=None if in_a < 0 else frames.baseline_moment(int(kept[in_a])),
-                candidate=None if in_b < 0 else frames.candidate_moment(int(kept[in_b])),
+                baseline=None if in_a < 0 else _at(frames.baseline_moment(int(kept[in_a])), matched.times[0][k]),
+                candidate=None if in_b < 0 else _at(frames.candidate_moment(int(kept[in_b])), matched.times[1][k]),
                 shift=float(shifts.seconds[k]) if paired else None,
                 shift_frames=int(shifts.frames[k]) if paired else None,
                 allowed=bool(shifts.allowed[k]),

@@ -12,16 +12,18 @@ from google.protobuf.message import DecodeError
 
 from replay import limits
 from replay.comparison.difference import Change
+from replay.comparison.signals import SCHEMAS
 from replay.errors import LimitError, RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_records import Chunk
 from replay.logs.protobuf import fields_of, message_type
 from replay.recording import messages
+from replay.recording.event_messages import TOPIC as EVENTS
+from replay.recording.event_messages import read_events
+from replay.recording.events import Events
 
 SCENE = "/scene"
 """The topic of the scene; begins the name of a body in changes and rules: `/scene/arc/bow`."""
-SCHEMAS = "/schemas"
-"""Begins the name of a field in changes and rules: `/schemas/collision/clearance`."""
 
 
 def equal_topics(a: McapLog, b: McapLog) -> frozenset[str]:
@@ -50,6 +52,15 @@ def same_messages(a: Path, b: Path) -> bool:
     with McapLog(a) as log_a, McapLog(b) as log_b:
         topics = [{channel.topic for channel in log.channels.values()} for log in (log_a, log_b)]
         return topics[0] == topics[1] == equal_topics(log_a, log_b)
+
+
+def same_events_of(a: McapLog, b: McapLog, topic: str) -> bool:
+    """Return whether two files tell the same events of a topic; one without events tells none."""
+    told = []
+    for log in (a, b):
+        found = [channel for channel in log.channels.values() if channel.topic == EVENTS]
+        told.append(read_events(log).of_source(topic) if found else Events.none())
+    return told[0] == told[1]
 
 
 def _chunks_by_channel(log: McapLog) -> dict[int, list[Chunk]]:

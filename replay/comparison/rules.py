@@ -26,6 +26,7 @@ class Tolerance:
         nan: whether NaN in both is equal, or any NaN a difference.
         zero: whether 0.0 and -0.0 are equal, or different.
         ignore: the signal is not compared and may be missing or extra.
+        bracket: largest shift [s] of an event that a run knows more finely than from frame to frame; None: as others.
     """
 
     abs: float = 0.0
@@ -35,6 +36,7 @@ class Tolerance:
     nan: Literal["equal", "fail"] = "equal"
     zero: Literal["equal", "signed"] = "equal"
     ignore: bool = False
+    bracket: float | None = None
 
 
 EXACT = Tolerance()

@@ -79,13 +79,13 @@ def _not_blank(value: str) -> str:
     return value
 
 
-_SHIFT_SCHEMA = {
-    "anyOf": [
-        {"type": "number", "minimum": 0},
-        {"type": "string", "pattern": r"^\s*[0-9]{1,9}\s+frames?\s*$"},
-        {"type": "string", "pattern": r"^\s*[0-9.eE+-]+\s*(s|ms|us|min)\s*$"},
-    ]
-}
+_SECONDS_SCHEMA = [
+    {"type": "number", "minimum": 0},
+    {"type": "string", "pattern": r"^\s*[0-9.eE+-]+\s*(s|ms|us|ns|min)\s*$"},
+]
+_FRAMES_SCHEMA = {"type": "string", "pattern": r"^\s*[0-9]{1,9}\s+frames?\s*$"}
+_TIME_SCHEMA = {"anyOf": _SECONDS_SCHEMA}
+_SHIFT_SCHEMA = {"anyOf": [*_SECONDS_SCHEMA, _FRAMES_SCHEMA]}
 _PATTERN_SCHEMA = {"type": "string", "pattern": r"^[/*]"}
 _PATTERNS_SCHEMA = {"anyOf": [_PATTERN_SCHEMA, {"type": "array", "items": _PATTERN_SCHEMA, "minItems": 1}]}
 _DAY_SCHEMA = {"type": "string", "pattern": r"^\d{4}-\d{2}-\d{2}$", "format": "date"}
@@ -106,6 +106,9 @@ class RuleText(Part):
     """Largest difference of numbers relative to the larger one; the larger of abs and rel counts."""
     time: Annotated[Shift, PlainValidator(_shift), WithJsonSchema(_SHIFT_SCHEMA)] = Shift()
     """Largest shift of an event: seconds, '20 ms', or '1 frame'."""
+    bracket: Annotated[float, PlainValidator(_TIME.parse), WithJsonSchema(_TIME_SCHEMA)] | None = None
+    """Largest gap between the brackets of an event that is known more finely than by frames: '100 us'; as time when
+    left out."""
     nan: Literal["equal", "fail"] = "equal"
     """equal: NaN in both runs is equal. fail: any NaN is a difference."""
     zero: Literal["equal", "signed"] = "equal"
@@ -169,6 +172,7 @@ def _rule(text: RuleText, place: str) -> Rule:
         rel=text.rel,
         time=text.time.seconds,
         frames=text.time.frames,
+        bracket=text.bracket,
         nan=text.nan,
         zero=text.zero,
         ignore=text.ignore,

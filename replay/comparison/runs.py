@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from replay.comparison.diff import compare
+from replay.comparison.diff import EVENTS, compare
 from replay.comparison.difference import JSON_VERSION, Change, Difference, DiffVerdict
-from replay.comparison.log_changes import SCENE, equal_topics, scene_changes, schema_changes
+from replay.comparison.log_changes import SCENE, equal_topics, same_events_of, scene_changes, schema_changes
 from replay.comparison.rules import Rules
 from replay.comparison.run_folder import recordings_in
 from replay.comparison.signals import places
@@ -19,6 +19,7 @@ from replay.logs.mcap_reader import McapLog
 from replay.recording.reader import Recording, own_topics, read, read_provenance
 
 _ATTEMPTS = 3
+COLLISION = "/collision"
 SCENARIOS = "/scenarios"
 """Begins the name of a scenario in rules: `/scenarios/carm_clear` with `ignore` lets it be missing or extra."""
 
@@ -186,26 +187,30 @@ def _identity(file: Path) -> tuple[int, ...]:
 
 def _read_pair(baseline: str | Path, candidate: str | Path, rules: Rules | None) -> RecordingPair:
     with McapLog(baseline) as log_a, McapLog(candidate) as log_b:
-        layout_a, layout_b = read_provenance(log_a).layout, read_provenance(log_b).layout
+        known_a, known_b = read_provenance(log_a), read_provenance(log_b)
         bytes_equal = equal_topics(log_a, log_b)
         equal = {
             topic
             for topic in bytes_equal
-            if places(layout_a, topic) == places(layout_b, topic)
+            if places(known_a.layout, topic, known_a.format) == places(known_b.layout, topic, known_b.format)
             and (rules is None or all(rule.tolerance.nan == "equal" for rule in rules.active))
         }
+        if COLLISION not in equal:  # its events say when levels begin and end
+            equal.discard(EVENTS)
+        elif EVENTS not in equal and not same_events_of(log_a, log_b, COLLISION):
+            equal.discard(COLLISION)
         lost, added = schema_changes(log_a, log_b)
         scene = () if SCENE in bytes_equal else scene_changes(log_a, log_b)
         names = [
             {channel.topic for channel in log.channels.values()} & own_topics(layout)
-            for log, layout in ((log_a, layout_a), (log_b, layout_b))
+            for log, layout in ((log_a, known_a.layout), (log_b, known_b.layout))
         ]
     return RecordingPair(
         read(baseline, topics=names[0] - equal if equal else None),
         read(candidate, topics=names[1] - equal if equal else None),
         (*scene, *lost),
         added,
-        sum(places(layout_a, topic)[1] for topic in equal),
+        sum(places(known_a.layout, topic, known_a.format)[1] for topic in equal),
     )
 
 

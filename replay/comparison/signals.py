@@ -18,14 +18,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from replay.collision.columns import CollisionColumns
+from replay.collision.columns import Between, CollisionColumns
+from replay.comparison.moments import Moments, moments
 from replay.numerics.arrays import Column
-from replay.numerics.columns import Field, Kind, components
+from replay.numerics.columns import Columns, Field, Kind, components
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.recording.reader import Recording
     from replay.simulation import Layout
+
+SCHEMAS = "/schemas"
+"""Begins the name of a field in changes and rules: `/schemas/collision/clearance`."""
 
 
 @dataclass(frozen=True, order=True, slots=True)
@@ -57,12 +61,16 @@ class Group:
         signals: S signals in the order of the columns.
         values: (F, S), or (F, S, 4) for rotations.
         categories: texts of the values -1, 0, 1, ... of a category whose numbers mean nothing between recordings.
+        moments: what the recording knows of its states' beginnings and ends beyond its frames.
+        between: whether the recording looked between its frames.
     """
 
     field: Field
     signals: tuple[Signal, ...]
     values: Column
     categories: tuple[str, ...] = ()
+    moments: Moments | None = None
+    between: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -71,6 +79,8 @@ class Group:
 
 
 JOINT_FIELDS = (Field("position"), Field("velocity"))
+BETWEEN_FRAMES = ("between", "clearance_bound")
+"""Fields of pairs that tell nothing when the model does not look between the frames."""
 TRANSLATION_FIELDS = tuple(Field(f"translation.{axis}", unit="m") for axis in "xyz")
 ROTATION_FIELD = Field("rotation", Kind.ROTATION, "rad")
 
@@ -94,13 +104,36 @@ def _all_groups(recording: Recording) -> Iterator[Group]:
         yield Group(field_, _signals("/tf", field_, layout.links), recording.link_poses[:, :, axis, 3])
     yield Group(ROTATION_FIELD, _signals("/tf", ROTATION_FIELD, layout.links), recording.link_quaternions)
     if recording.collision is not None:
-        for field_ in _gates_first(recording.collision.fields()):
+        between = looked_between(recording)
+        for field_ in _gates_first(recording.collision.present()):
             signals = _signals("/collision", field_, layout.pairs)
-            yield Group(field_, signals, getattr(recording.collision, field_.name))
+            known = None
+            if field_.name == "level" and between:
+                known = moments(field_, layout.pairs, "/collision", recording.events, recording.time)
+            yield Group(field_, signals, getattr(recording.collision, field_.name), (), known, between)
     for kind, columns in recording.readings.items():
         topics = [KINDS[kind].topic(sensor) for sensor in layout.sensors[kind]]
         for field_ in _gates_first(columns.present()):
             yield from _of_sensors(topics, field_, getattr(columns, field_.name), layout)
+
+
+def silent_fields(recording: Recording) -> set[tuple[str, str]]:
+    """Return the keys of the groups that a recording cannot have: its format is older, or its model does not look."""
+    columns = {"collision": recording.collision, **recording.readings}
+    found = {
+        (topic, field_.name)
+        for topic, group in columns.items()
+        if group is not None
+        for field_ in group.fields()
+        if getattr(group, field_.name) is None
+    }
+    return found if looked_between(recording) else found | {("collision", name) for name in BETWEEN_FRAMES}
+
+
+def looked_between(recording: Recording) -> bool:
+    """Return whether a recording says what lies between its frames: its format and its model do."""
+    between = None if recording.collision is None else recording.collision.between
+    return between is not None and bool((between != Between.NOT_LOOKED).any())
 
 
 def _gates_first(fields: Sequence[Field]) -> list[Field]:
@@ -117,8 +150,8 @@ def _of_sensors(topics: Sequence[str], field_: Field, values: Column, layout: La
         yield Group(part, signals, column.reshape(len(column), len(signals)), categories)
 
 
-def places(layout: Layout, topic: str) -> tuple[object, int]:
-    """Return the names that a topic's columns stand for, and how many signals it has.
+def places(layout: Layout, topic: str, format: int) -> tuple[object, int]:
+    """Return the names that a topic's columns stand for, and how many signals it has in a format of recordings.
 
     Two topics of the same bytes are the same signals when these names are the same.
     """
@@ -128,11 +161,16 @@ def places(layout: Layout, topic: str) -> tuple[object, int]:
         case "tf":
             return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
         case "collision":
-            return layout.pairs, len(CollisionColumns.fields()) * len(layout.pairs)
-    fields = [field_ for field_ in KINDS[group].columns.fields() if not field_.optional] if group in KINDS else []
+            return layout.pairs, len(_of_format(CollisionColumns, format)) * len(layout.pairs)
+    known = _of_format(KINDS[group].columns, format) if group in KINDS else []
+    fields = [field_ for field_ in known if not field_.optional]
     meant = {names: getattr(layout, names) for field_ in fields for names in (field_.each, field_.names) if names}
     counts = (len(meant[field_.each]) if field_.each else len(field_.letters) or 1 for field_ in fields)
     return meant, sum(counts)
+
+
+def _of_format(columns: type[Columns], format: int) -> list[Field]:
+    return [field_ for field_ in columns.fields() if field_.since <= format]
 
 
 def _signals(topic: str, field_: Field, names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Signal, ...]:

@@ -73,7 +73,10 @@ def _tolerance(items: list[SignalDifference]) -> Iterator[str]:
     """Yield the lines of a rule that accepts a signal; it keeps what the signal's present rule says of NaN and zero."""
     present = items[0].rule.tolerance if items[0].rule is not None else EXACT
     if items[0].event_count:
-        yield f"time: {count(max(item.max_shift_frames for item in items), 'frame')}"
+        frames, shift = (max(getattr(item, name) for item in items) for name in ("max_shift_frames", "max_shift"))
+        yield f"time: {count(frames, 'frame')}" if frames else f"time: {round_up(shift)}"
+        if frames and present.bracket is not None:
+            yield f"bracket: {round_up(shift)}"
         return
     worst = max(item.worst_abs.error for item in items if item.worst_abs is not None)
     relative = [item.worst_rel.error for item in items if item.worst_rel is not None]

@@ -77,11 +77,11 @@ def event(item: EventDifference) -> str:
     if item.fate is Fate.SHIFTED:
         assert item.baseline is not None and item.candidate is not None
         assert item.shift is not None and item.shift_frames is not None
-        later = "later" if item.shift_frames > 0 else "earlier"
-        return (
-            f"{item.what} {count(abs(item.shift_frames), 'frame')} {later} ({item.shift * 1e3:+.4g} ms): "
-            f"{moment(item.baseline)} -> {moment(item.candidate)}{allowed}"
-        )
+        later = "later" if (item.shift_frames or item.shift) > 0 else "earlier"
+        much = f"{abs(item.shift) * 1e6:.4g} us {later}"
+        if item.shift_frames:
+            much = f"{count(abs(item.shift_frames), 'frame')} {later} ({item.shift * 1e3:+.4g} ms)"
+        return f"{item.what} {much}: {moment(item.baseline)} -> {moment(item.candidate)}{allowed}"
     at = item.baseline if item.fate is Fate.VANISHED else item.candidate
     assert at is not None
     where = "only in the baseline" if item.fate is Fate.VANISHED else "only in the candidate"
@@ -152,6 +152,7 @@ def tolerance(item: Rule) -> str:
     parts += [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
     parts += [f"time {seconds(given.time)}"] if given.time else []
     parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
+    parts += [f"bracket {seconds(given.bracket)}"] if given.bracket is not None else []
     parts += [
         f"{key}: {getattr(given, key)}" for key in ("nan", "zero") if getattr(given, key) != getattr(default, key)
     ]

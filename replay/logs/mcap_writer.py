@@ -33,6 +33,11 @@ class Sink(Protocol):
         """Append bytes."""
 
 
+def rows_of_chunk(length: int) -> int:
+    """Return how many messages of a length one chunk takes."""
+    return max(1, _CHUNK_BYTES // (RECORD_HEAD + MESSAGE_HEAD + length))
+
+
 class MessageRows:
     """The message records of one channel in one block, of equal length, as rows of bytes.
 
@@ -124,7 +129,7 @@ class McapFileWriter:
     def rows(self, rows: MessageRows) -> None:
         """Write a block of messages of equal length as one chunk, or as several when it is very large."""
         n, stride = rows.records.shape
-        step = max(1, _CHUNK_BYTES // stride)
+        step = rows_of_chunk(rows.data.shape[1])
         for begin in range(0, n, step):
             part = rows.records[begin : begin + step]
             offsets = np.arange(0, part.size, stride, dtype=np.uint64)

@@ -38,7 +38,7 @@ class Field:
 
     Attributes:
         name: as it stands in messages and in a signal's full name.
-        kind: how its values are compared; of `Columns` it follows from their type.
+        kind: how its values are compared; of `Columns` it follows from their type, but for states that have no order.
         unit: of its values; "" when they have none.
         gate: the field that says whether this one has a value at all, such as `status` for `distance`. In frames in
             which the gates of two runs disagree, the gate's event is the difference and this field's is its echo.
@@ -56,8 +56,9 @@ class Field:
         beam: it is a point in world coordinates, drawn at the end of a line from its sensor.
         type: of the values.
         most: largest value of one that counts or is a state; what its type or `states` allow when left out.
-        nothing: the value when there is nothing to tell.
-        optional: whether the column may be None, and is not recorded then; it follows from its type.
+        nothing: the value when there is nothing to tell; of `Columns` it follows from the type unless it is a state.
+        since: version of the recording format that first holds it; the column of an older recording is None.
+        optional: whether the column may be None; it follows from its type. A sensor's that is None is not recorded.
     """
 
     name: str = ""
@@ -77,21 +78,23 @@ class Field:
     type: np.dtype[Any] = dataclasses.field(default_factory=lambda: np.dtype(np.float64))
     most: int = 0
     nothing: float = np.nan
+    since: int = 1
     optional: bool = False
 
 
 class Columns:
-    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`."""
+    """Base of groups of columns: dataclasses whose attributes are annotated with their `Field`; others are none."""
 
     @classmethod
     @functools.cache
     def fields(cls) -> tuple[Field, ...]:
         """Return the description of each column, in order."""
         hints = get_type_hints(cls, include_extras=True)
-        return tuple(_described(field.name, *get_args(hints[field.name])) for field in dataclasses.fields(cls))  # type: ignore[arg-type]
+        columns = (field.name for field in dataclasses.fields(cls) if hasattr(hints[field.name], "__metadata__"))  # type: ignore[arg-type]
+        return tuple(_described(name, *get_args(hints[name])) for name in columns)
 
     def present(self) -> tuple[Field, ...]:
-        """Return the description of each column that there is, in order."""
+        """Return the description of each column that there is, in order: an older recording may lack some."""
         return tuple(field for field in self.fields() if getattr(self, field.name) is not None)
 
     @classmethod
@@ -115,16 +118,17 @@ def _described(name: str, array: Any, field: Field) -> Field:
     most = max(field.states) if field.states else field.most
     if not most and dtype.kind != "f":
         most = 1 if dtype.kind == "b" else int(np.iinfo(dtype).max)
-    nothing = {"f": np.nan, "i": -1}
+    nothing = {"f": np.nan, "i": -1}.get(dtype.kind, 0)
+    unordered = field.states is not None and field.kind is Kind.CATEGORY
     return dataclasses.replace(
         field,
         name=name,
-        kind=Kind.LEVEL if field.states else kinds.get(dtype.kind, Kind.CATEGORY),
+        kind=Kind.LEVEL if field.states and not unordered else kinds.get(dtype.kind, Kind.CATEGORY),
         label=field.label or name.replace("_", " "),
         begins=field.begins or tuple(field.events),
         most=most,
         type=dtype,
-        nothing=nothing.get(dtype.kind, 0),
+        nothing=nothing if np.isnan(field.nothing) else field.nothing,
         optional=optional,
     )
 

@@ -13,51 +13,36 @@ import numpy as np
 
 from replay.numerics.arrays import Floats
 from replay.recording import blueprint
-from replay.recording.rerun_columns import Chunks, Column, constants, made
+from replay.recording.rerun_columns import Column, constants
+from replay.recording.rerun_inside import ChunkBlueprint, available, made, parts_of
 
 _EYE, _AXIS = "EyeControls3D", "TimeAxis"  # what the library calls the parts that differ
 
 
-class RecordingBlueprint:
-    """The arrangement that `blueprint.recording` describes, as rerun's `send_blueprint` takes it.
+def recording_blueprint(charts: Collection[str], corners: Floats, end: int) -> Any:
+    """Return the arrangement that `blueprint.recording` describes, as `rerun_inside.send_blueprint` takes it.
 
     Args:
         charts: which of `blueprint.CHARTS` have curves.
         corners: (n, 3) points [m] in world coordinates that the first picture should show.
         end: time [ns] at which the charts end.
     """
-
-    def __init__(self, charts: Collection[str], corners: Floats, end: int) -> None:
-        own = {_EYE: constants(blueprint.eye_of(corners)), _AXIS: _axis(end)}
-        self._chunks = Chunks()
-        for path, chunk in _chunks(frozenset(charts)).items():
-            columns = own.get(path.rpartition("/")[2])
-            self._chunks.take(chunk if columns is None else made(path, _first(), columns))
-
-    def to_blueprint(self) -> RecordingBlueprint:
-        """Return this."""
-        return self
-
-    def _log_to_stream(self, stream: Any) -> None:
-        self._chunks.send(stream)
-
-
-class _Recorder:
-    """Takes what a blueprint logs: its chunks by the path in the blueprint."""
-
-    def __init__(self) -> None:
-        self.chunks: dict[str, Any] = {}
-
-    def log(self, path: str, archetype: Any) -> None:
-        self.chunks[path] = made(path, _first(), constants(archetype))
+    eye = blueprint.eye_of(corners)
+    if not available():
+        return blueprint.recording(charts, eye, blueprint.axis_until(end))
+    own = {_EYE: constants(eye), _AXIS: _axis(end)}
+    return ChunkBlueprint(
+        [
+            made(path, _first(), own[part]) if (part := path.rpartition("/")[2]) in own else chunk
+            for path, chunk in _chunks(frozenset(charts)).items()
+        ]
+    )
 
 
 @functools.cache
 def _chunks(charts: frozenset[str]) -> dict[str, Any]:
-    recorder = _Recorder()
-    anywhere = blueprint.eye_of(np.eye(3))
-    blueprint.recording(charts, anywhere, blueprint.axis_until(1))._log_to_stream(recorder)
-    return recorder.chunks
+    described = blueprint.recording(charts, blueprint.eye_of(np.eye(3)), blueprint.axis_until(1))
+    return {path: made(path, _first(), constants(archetype)) for path, archetype in parts_of(described)}
 
 
 @functools.lru_cache(maxsize=16)  # runs of a night are often equally long

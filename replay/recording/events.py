@@ -1,4 +1,8 @@
-"""What begins and what ends in a recording: of pairs and of sensors, found from the columns."""
+"""What begins and what ends in a recording: of pairs and of sensors, found from the columns.
+
+An event is known by a bracket of time. Levels of pairs have narrow ones where their crossings were found; all that is
+known of anything else is that a frame shows it and the frame before does not.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.collision.columns import CollisionColumns
+from replay.collision.columns import CollisionColumns, Crossings, Level
 from replay.numerics.arrays import Flags, Integers
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
@@ -19,6 +23,8 @@ _FIELDS = [*CollisionColumns.fields(), *(field for kind in KINDS.values() for fi
 SEVERITY = {event: severity for field in _FIELDS for event, severity in field.events.items()}
 """Foxglove's log level of the beginning of each kind of event; the end of any is information (2)."""
 _INFORMATION = 2
+_LEVELS = {"bounds": Level.BOUNDS, "contact": Level.CONTACT}
+"""The kinds of events that crossings tell of, and the level that begins or ends."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +60,9 @@ class Event:
     """One thing that begins or ends; see `Transition`.
 
     Attributes:
-        time: [ns] from the scenario's start.
-        frame: index of the first frame in which it has begun or ended.
+        time: [ns] from the scenario's start, by which it has begun or ended.
+        frame: index of the first frame at or after `time`.
+        earliest: [ns], from when on it may have; None in a recording of format 1.
     """
 
     time: int
@@ -64,6 +71,7 @@ class Event:
     begins: bool
     subject: str
     source: str
+    earliest: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,22 +79,24 @@ class Events(Sequence[Event]):
     """n events, in the order of time, held as columns; an `Event` is made when it is asked for.
 
     Attributes:
-        time: (n,) [ns] from the scenario's start.
-        frame: (n,) index of the first frame in which it has begun or ended.
+        time: (n,) [ns] from the scenario's start, by which it has begun or ended.
+        frame: (n,) index of the first frame at or after `time`.
         code: (n,) index into `transitions`.
         transitions: each is different.
+        earliest: (n,) [ns], from when on it may have; None in a recording of format 1.
     """
 
     time: Integers
     frame: Integers
     code: Integers
     transitions: tuple[Transition, ...]
+    earliest: Integers | None = None
 
     @staticmethod
     def none() -> Events:
         """Return no events."""
         empty = np.zeros(0, dtype=np.int64)
-        return Events(empty, empty, empty, ())
+        return Events(empty, empty, empty, (), empty)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -97,10 +107,15 @@ class Events(Sequence[Event]):
     def __getitem__(self, index: slice) -> Events: ...
     def __getitem__(self, index: int | slice) -> Event | Events:
         if isinstance(index, slice):
-            return Events(self.time[index], self.frame[index], self.code[index], self.transitions)
+            return self._taken(index)
         what = self.transitions[self.code[index]]
         time, frame = int(self.time[index]), int(self.frame[index])
-        return Event(time, frame, what.kind, what.begins, what.subject, what.source)
+        earliest = None if self.earliest is None else int(self.earliest[index])
+        return Event(time, frame, what.kind, what.begins, what.subject, what.source, earliest)
+
+    def _taken(self, which: slice | Integers) -> Events:
+        earliest = None if self.earliest is None else self.earliest[which]
+        return Events(self.time[which], self.frame[which], self.code[which], self.transitions, earliest)
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same events in the same order."""
@@ -118,18 +133,46 @@ class Events(Sequence[Event]):
         """
         place = {(kind, name): at for at, (kind, name, _) in enumerate(_subjects(layout))}
         ranks = [place.get((what.kind, what.subject), len(place)) for what in self.transitions]
-        order = np.lexsort((np.array(ranks, dtype=np.int64)[self.code], self.time))
-        return Events(self.time[order], self.frame[order], self.code[order], self.transitions)
+        return self._taken(np.lexsort((np.array(ranks, dtype=np.int64)[self.code], self.time)))
 
     def count_missing_in(self, other: Events) -> int:
         """Return how many of these events the other does not have."""
-        mine, theirs = (rows.view("i8,i8,i8")[:, 0] for rows in _table(self, other))
+        mine, theirs = (rows.view("i8,i8,i8,i8")[:, 0] for rows in _table(self, other))
         return int((~np.isin(mine, theirs)).sum())
 
+    def of_source(self, topic: str) -> Events:
+        """Return those that a topic tells."""
+        mine = np.array([what.source == topic for what in self.transitions], dtype=np.bool_)
+        return self._taken(np.flatnonzero(mine[self.code]))
+
+    def at_frames(self) -> Events:
+        """Return what frames show of these, at the times that frames tell: what begins and ends between two is not.
+
+        Each happens at the number of its frame, as `time` and as `earliest`.
+        """
+        if not len(self):
+            return Events.none()
+        subjects = {(what.kind, what.subject, what.source): k for k, what in enumerate(self.transitions)}
+        of = np.array([subjects[what.kind, what.subject, what.source] for what in self.transitions], dtype=np.int64)
+        begins = np.array([what.begins for what in self.transitions], dtype=np.bool_)
+        order = np.lexsort((np.arange(len(self)), of[self.code], self.frame))
+        rows = np.stack([self.frame, of[self.code]])[:, order]
+        new = np.ones(len(order), dtype=np.bool_)
+        new[1:] = (rows[:, 1:] != rows[:, :-1]).any(axis=0)
+        (first,) = np.nonzero(new)
+        last = np.append(first[1:], len(order)) - 1
+        first, last = order[first], order[last]
+        kept = np.sort(last[begins[self.code[first]] == begins[self.code[last]]])
+        return Events(self.frame[kept], self.frame[kept], self.code[kept], self.transitions, self.frame[kept])
+
     def columns(self) -> dict[str, NDArray[np.generic]]:
-        """Return time [ns], frame, kind, begins and subject of all events, (n,) each."""
+        """Return time and earliest [ns], frame, kind, begins and subject of all events, (n,) each.
+
+        A recording of format 1 has no `earliest`.
+        """
         return {
             "time": self.time,
+            **({} if self.earliest is None else {"earliest": self.earliest}),
             "frame": self.frame,
             "kind": np.array([what.kind for what in self.transitions], dtype=np.str_)[self.code],
             "begins": np.array([what.begins for what in self.transitions], dtype=np.bool_)[self.code],
@@ -138,12 +181,14 @@ class Events(Sequence[Event]):
 
 
 def _table(a: Events, b: Events) -> tuple[Integers, Integers]:
-    """Return both as rows (n, 3) of time, frame and a code that means the same in both."""
+    """Return both as rows (n, 4) of time, earliest time, frame and a code that means the same in both."""
     common = {what: code for code, what in enumerate(dict.fromkeys((*a.transitions, *b.transitions)))}
     tables = []
     for events in (a, b):
         codes = np.array([common[what] for what in events.transitions], dtype=np.int64)
-        tables.append(np.ascontiguousarray(np.stack([events.time, events.frame, codes[events.code]], axis=1)))
+        earliest = np.full(len(events), -1) if events.earliest is None else events.earliest
+        rows = np.stack([events.time, earliest, events.frame, codes[events.code]], axis=1)
+        tables.append(np.ascontiguousarray(rows))
     return tables[0], tables[1]
 
 
@@ -153,6 +198,7 @@ class EventFinder:
     def __init__(self, layout: Layout) -> None:
         self._first: dict[str, int] = {}
         self._last: dict[str, Flags] = {}
+        self._before = 0  # [ns], the frame before the next block
         self._subjects = list(_subjects(layout))
         for at, (kind, _, _) in enumerate(self._subjects):
             self._first.setdefault(kind, 2 * at)
@@ -161,22 +207,32 @@ class EventFinder:
             self._last[kind] = np.zeros(counts[kind], dtype=np.bool_)
 
     def find(self, block: FrameBlock) -> Events:
-        """Return the events of the next block, by frame, and within a frame by kind and name."""
-        frames, codes = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        """Return the events of the next block, by time, and at one time by kind and name."""
+        crossings = Crossings.none() if block.collision is None else block.collision.crossings
+        before = np.concatenate([[min(self._before, int(block.time[0]))], block.time[:-1]])
+        self._before = int(block.time[-1])
+        columns = [(np.zeros(0, dtype=np.int64),) * 4]  # number, frame in the block, time, earliest
         for kind, state in _states(block):
             changed = np.empty(state.shape, dtype=np.bool_)
             np.not_equal(state[0], self._last[kind], out=changed[0])
             np.not_equal(state[1:], state[:-1], out=changed[1:])
             self._last[kind] = state[-1].copy()
+            if kind in _LEVELS:
+                mine = np.flatnonzero(crossings.level == _LEVELS[kind])
+                frame, pair = crossings.frame[mine] - block.first, crossings.pair[mine]
+                number = self._first.get(kind, 0) + 2 * pair + crossings.begins[mine]
+                columns.append((number, frame, crossings.latest[mine], crossings.earliest[mine]))
+                changed[frame, pair] = False  # the crossings tell it
             found = np.flatnonzero(changed)
             if len(found):
-                frames.append(found // state.shape[1])
-                codes.append(self._first[kind] + 2 * (found % state.shape[1]) + state.reshape(-1)[found])
-        frame = np.concatenate(frames)
-        numbers, code = np.unique(np.concatenate(codes), return_inverse=True)
-        order = np.argsort(frame, kind="stable")
+                frame, subject = found // state.shape[1], found % state.shape[1]
+                number = self._first[kind] + 2 * subject + state.reshape(-1)[found]
+                columns.append((number, frame, block.time[frame], before[frame]))
+        number, frame, time, earliest = (np.concatenate(parts) for parts in zip(*columns, strict=True))
+        order = np.lexsort((number // 2, time))  # what begins and ends at one time stays in the order of its crossings
+        numbers, code = np.unique(number, return_inverse=True)
         transitions = tuple(self._transition(number) for number in numbers.tolist())
-        return Events(block.time[frame[order]], block.first + frame[order], code[order], transitions)
+        return Events(time[order], block.first + frame[order], code[order], transitions, earliest[order])
 
     def _transition(self, number: int) -> Transition:
         kind, subject, source = self._subjects[number // 2]

@@ -50,7 +50,7 @@ def tables(recording: Recording) -> dict[str, Table]:
     if recording.collision is not None:
         result["/collision"] = dict(time)
         for pair, name in enumerate(layout.pairs):
-            for field in recording.collision.fields():
+            for field in recording.collision.present():
                 values = getattr(recording.collision, field.name)[:, pair]
                 _add(result["/collision"], f"{name} {field.label}", field, values, layout)
     for kind, columns in recording.readings.items():
@@ -63,7 +63,7 @@ def tables(recording: Recording) -> dict[str, Table]:
                 if not field.each:
                     _add(table, field.label, field, values, layout)
     events = recording.events.columns()
-    result["/events"] = {"time [ns]": events.pop("time"), **events}
+    result["/events"] = {f"{name} [ns]" if name in ("time", "earliest") else name: events[name] for name in events}
     return result
 
 

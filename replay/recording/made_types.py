@@ -42,9 +42,11 @@ def _add(message: DescriptorProto, name: str, field: Field) -> None:
     )
     if field.states is not None:
         title = field.name.title().replace("_", "")
+        taken = {value.name for states in message.enum_type for value in states.value}
+        prefix = f"{field.name.upper()}_" if taken & set(field.states.__members__) else ""  # names of a message differ
         states = message.enum_type.add(name=title)
         for state in field.states:
-            states.value.add(name=state.name, number=state.value)
+            states.value.add(name=prefix + state.name, number=state.value)
         entry.type, entry.type_name = FieldDescriptorProto.TYPE_ENUM, f".{name}.{title}"
     if field.letters:
         entry.type, entry.type_name = FieldDescriptorProto.TYPE_MESSAGE, f".{name}.Vector"

@@ -1,4 +1,8 @@
-"""The message types of a recording: our own, made of the fields that they carry, and Foxglove's."""
+"""The message types of a recording: our own, made of the fields that they carry, and Foxglove's.
+
+Foxglove's Log has one field more in a recording, far behind its own: `earliest`, from when on [ns] an event may have
+been.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import functools
 from typing import Any
 
 from google.protobuf import descriptor_pool, message_factory
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorSet
 
 from replay.collision.columns import CollisionColumns
 from replay.logs.mcap_records import Schema
@@ -19,6 +24,8 @@ JOINTS = "foxglove.JointStates"
 TRANSFORMS = "foxglove.FrameTransforms"
 SCENE = "foxglove.SceneUpdate"
 LOG = "foxglove.Log"
+EARLIEST = 1000
+"""Number of the field `earliest` of Log."""
 
 
 @functools.cache
@@ -52,5 +59,25 @@ def _foxglove(name: str) -> Any:
         JOINTS: JointStates_pb2.JointStates,
         TRANSFORMS: FrameTransforms_pb2.FrameTransforms,
         SCENE: SceneUpdate_pb2.SceneUpdate,
-        LOG: Log_pb2.Log,
+        LOG: _with_earliest(Log_pb2.Log),
     }[name]
+
+
+@functools.cache
+def _with_earliest(log: Any) -> Any:
+    files = FileDescriptorSet.FromString(descriptor_set(log.DESCRIPTOR))
+    message = files.file[-1].message_type[0]
+    message.field.add(
+        name="earliest",
+        json_name="earliest",
+        number=EARLIEST,
+        type=FieldDescriptorProto.TYPE_SFIXED64,
+        label=FieldDescriptorProto.LABEL_OPTIONAL,
+        oneof_index=len(message.oneof_decl),
+        proto3_optional=True,
+    )
+    message.oneof_decl.add(name="_earliest")
+    pool = descriptor_pool.DescriptorPool()
+    for file in files.file:
+        pool.AddSerializedFile(file.SerializeToString())
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(log.DESCRIPTOR.full_name))

@@ -24,12 +24,14 @@ from replay.errors import LimitError, RecordingError
 from replay.json_text import read_json, typed
 from replay.simulation import BLOCK_FRAMES, Layout
 
-FORMAT = 1
+FORMAT = 2
 """Version of the recording format that is written."""
-READABLE_FORMATS = (1,)
-"""Versions that are read: the one that is written and, once there is one, the one before."""
+READABLE_FORMATS = (1, 2)
+"""Versions that are read: the one that is written and the one before."""
 RECORD = "replay"
 """Name of the MCAP metadata record that holds the provenance."""
+WITHOUT_RESULTS = ("bench", "cli")
+"""Rooms that nothing is imported from on the way to a recording: after a change of theirs a run can be resumed."""
 LIBRARIES = ("numba", "numpy", "protobuf", "python-fcl", "scipy", "trimesh", "vhacdx", "zstandard")
 
 
@@ -44,7 +46,7 @@ class Provenance:
         layout: the names behind the columns.
         model: the resolved model, with the revision of each method.
         files: SHA-256 of each attached file, by its name among the attachments.
-        code: SHA-256 of the package's sources.
+        code: SHA-256 of the package's sources, see `code_identity`.
         version: of the package.
         libraries: versions of the libraries that numbers may depend on.
         block_frames: frames a block.
@@ -133,9 +135,14 @@ def sha256(data: bytes) -> str:
 
 @functools.cache
 def code_identity() -> str:
-    """Return a SHA-256 over names and contents of the package's sources: the same wherever it is installed."""
+    """Return the identity of this package's sources: the same wherever it is installed."""
+    return identity_of(resources.files("replay"))
+
+
+def identity_of(package: Traversable) -> str:
+    """Return a SHA-256 over names and contents of a package's sources, without the rooms that no result depends on."""
     digest = hashlib.sha256()
-    for name, data in sorted(_sources(resources.files("replay"), "")):
+    for name, data in sorted(_sources(package, "")):
         digest.update(f"{name}\0{len(data)}\0".encode())
         digest.update(data)
     return digest.hexdigest()
@@ -182,7 +189,7 @@ def _sources(folder: Traversable, prefix: str) -> list[tuple[str, bytes]]:
     found = []
     for entry in folder.iterdir():
         if entry.is_dir():
-            if entry.name != "__pycache__":
+            if entry.name != "__pycache__" and prefix + entry.name not in WITHOUT_RESULTS:
                 found += _sources(entry, f"{prefix}{entry.name}/")
         elif entry.name.endswith(".py"):
             found.append((prefix + entry.name, entry.read_bytes()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,8 @@ class Recording:
     """A whole recording: the columns of `FrameBlock` for all F frames.
 
     Every number is the one that was written, bit by bit, except `link_poses`: a pose is stored as translation and
-    unit quaternion (`link_quaternions`), and its rotation matrix is computed again from that.
+    unit quaternion (`link_quaternions`), and its rotation matrix is computed again from that. A column that the format
+    of an older recording does not have is None. `collision.crossings` are empty: the events tell them.
 
     Attributes:
         path: the file.
@@ -211,9 +212,10 @@ class _Assembly:
         """Return the times of the frames of whole blocks: those that every topic of the recording has."""
         per_frame = self._topics.values()
         time = self._topic(FRAMES).time
-        count = min(len(topic.time) for topic in per_frame)
+        count = len(time)
         if self._log.loss is not None:
             block = self._provenance.block_frames
+            count = min(len(topic.time) for topic in per_frame)
             count = count if count == self._provenance.frames else count // block * block
         time = time[:count]
         for topic in per_frame:
@@ -256,8 +258,13 @@ class _Assembly:
             return -1, len(getattr(self._layout, field.names)) - 1
         return (-1 if field.type.kind == "i" else 0), field.most
 
-    def _field(self, topic: Topic, field: Field) -> NDArray[Any]:
-        """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n)."""
+    def _field(self, topic: Topic, field: Field) -> NDArray[Any] | None:
+        """Take a field of all frames out of a topic, (F,) or, of a vector or a list, (F, n).
+
+        None of one that the format of the recording does not have.
+        """
+        if field.since > self._provenance.format:
+            return None
         if field.letters:
             return np.stack([self._column(topic, f"{field.name}.{c}", field) for c in field.letters], axis=1)
         count = len(getattr(self._layout, field.each)) if field.each else None
@@ -273,22 +280,24 @@ class _Assembly:
         if "/collision" not in self._topics:
             return None
         topic = self._topic("/collision")
-        return CollisionColumns(**{field.name: self._field(topic, field) for field in CollisionColumns.fields()})
+        columns: dict[str, Any] = {field.name: self._field(topic, field) for field in CollisionColumns.fields()}
+        return CollisionColumns(**columns)
 
     def _readings(self) -> dict[str, Any]:
         found = {}
         for kind, names in self._layout.sensors.items():
             topics = [self._topics[topic] for topic in map(KINDS[kind].topic, names) if topic in self._topics]
-            columns = KINDS[kind].columns
             if topics:
-                found[kind] = columns(
-                    **{
-                        f.name: np.stack([self._field(t, f) for t in topics], axis=1)
-                        for f in columns.fields()
-                        if not (f.optional and _lack(topics, f))
-                    }
-                )
+                columns = KINDS[kind].columns
+                found[kind] = columns(**{field.name: self._of_sensors(topics, field) for field in columns.fields()})
         return found
+
+    def _of_sensors(self, topics: list[Topic], field: Field) -> NDArray[Any] | None:
+        if field.optional and not any(field.name in topic.columns for topic in topics):
+            return None  # its method has no such column
+        values = [self._field(topic, field) for topic in topics]
+        present = [value for value in values if value is not None]
+        return np.stack(present, axis=1) if present else None
 
     def _events(self) -> Events:
         if not self._with_events:
@@ -312,11 +321,6 @@ def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
             for kind, names in layout.sensors.items()
         },
     )
-
-
-def _lack(topics: Sequence[Topic], field: Field) -> bool:
-    """Return whether no topic has a field, which then was not recorded."""
-    return not any(field.name in topic.columns for topic in topics)
 
 
 def _stack(columns: list[Any], frames: int, *rest: int) -> Any:

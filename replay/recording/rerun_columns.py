@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from replay.numerics.arrays import Integers, ShortIntegers
 from replay.recording.blueprint import TIMELINE
+from replay.recording.rerun_inside import made
 
 Lengths = int | Integers
 """How many elements each list has: one number for all lists, or (n,) numbers."""
@@ -65,15 +66,6 @@ def index_of(time: Integers, frames: Integers) -> Index:
     return {TIMELINE: _flat(pa.duration("ns"), time), "frame": _flat(pa.int64(), frames)}
 
 
-def made(path: str, index: Index, columns: Iterable[Column]) -> Any:
-    """Return a chunk of an entity; the columns have as many rows as the index, or one row without an index.
-
-    Chunks are made by the function that the library's `Chunk.from_columns` calls, and may be sent more than once.
-    """
-    wrap, make = _chunk_type()
-    return wrap(make(path, index, dict(columns)))
-
-
 class Chunks:
     """Takes chunks and sends them together: each sending wakes a thread of the library, which costs several chunks."""
 
@@ -81,25 +73,13 @@ class Chunks:
         self._chunks: list[Any] = []
 
     def add(self, path: str, index: Index, columns: Iterable[Column]) -> None:
-        """Take columns of an entity, as of `made`."""
-        self.take(made(path, index, columns))
-
-    def take(self, chunk: Any) -> None:
-        """Take a chunk."""
-        self._chunks.append(chunk)
+        """Take columns of an entity, as of `rerun_inside.made`."""
+        self._chunks.append(made(path, index, columns))
 
     def send(self, stream: Any) -> None:
         """Send all that was taken to a rerun.RecordingStream."""
         stream.send_chunks(self._chunks)
         self._chunks = []
-
-
-@functools.cache
-def _chunk_type() -> tuple[Any, Any]:
-    from rerun.chunk import Chunk
-    from rerun_bindings import ChunkInternal
-
-    return Chunk, ChunkInternal.from_columns
 
 
 def entity(*parts: str) -> str:

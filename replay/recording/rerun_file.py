@@ -22,6 +22,7 @@ from typing import Any
 
 from replay.errors import WriteError
 from replay.logs.part_file import PartFile
+from replay.recording import rerun_inside
 
 _FLUSH = 60.0  # [s] until what was sent must have been written
 _PIECE = 1 << 20  # bytes
@@ -76,9 +77,7 @@ class RerunFile:
 
     def arrange(self, blueprint: Any) -> None:
         """Say how the viewer arranges the recording; `blueprint` is as of rerun.RecordingStream.send_blueprint."""
-        noted = _Noted(blueprint)
-        self.stream.send_blueprint(noted)
-        noted.stream.disconnect()
+        rerun_inside.send_blueprint(self.stream, blueprint)
 
     def flush(self) -> None:
         """Wait until everything that was sent is written; WriteError when that fails."""
@@ -148,22 +147,6 @@ class RerunFile:
     def _check(self) -> None:
         if self._error is not None:
             raise self._error
-
-
-class _Noted:
-    """A blueprint that knows which stream the library makes for it: until that is disconnected it holds itself."""
-
-    def __init__(self, blueprint: Any) -> None:
-        self._blueprint = blueprint
-        self.stream: Any = None
-
-    def to_blueprint(self) -> _Noted:
-        """Return this."""
-        return self
-
-    def _log_to_stream(self, stream: Any) -> None:
-        self.stream = stream
-        self._blueprint.to_blueprint()._log_to_stream(stream)
 
 
 def _give_back() -> None:

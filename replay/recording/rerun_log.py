@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import Level
+from replay.collision.passages import passages
 from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats
 from replay.recording import blueprint
-from replay.recording.blueprint_parts import RecordingBlueprint
+from replay.recording.blueprint_parts import recording_blueprint
 from replay.recording.events import EventFinder
 from replay.recording.rerun_columns import Chunks, Column, Index, column, entity, index_of, packed
 from replay.recording.rerun_file import RerunFile
@@ -95,7 +96,7 @@ class RerunWriter:
     def finish(self) -> None:
         """Begin to finish the file in the background, with the arrangement of what was found."""
         if self._stream is not None:
-            layout = RecordingBlueprint({chart for chart, _ in self._named}, self._corners, self._end)
+            layout = recording_blueprint({chart for chart, _ in self._named}, self._corners, self._end)
             self._file.arrange(layout)
             self._stream = None
             self._file.finish()
@@ -163,6 +164,22 @@ class RerunWriter:
             if rows.any():
                 colors = column("Mesh3D", "albedo_factor", palette[level[rows]], 1)
                 self._send(block, rows, body_path(self._scene, self._scene.bodies[k]), colors)
+        self._flashes(block, palettes.reshape(-1, 3), levels)
+
+    def _flashes(self, block: FrameBlock, palettes: NDArray[np.uint32], levels: NDArray[np.uint8]) -> None:
+        """Colour bodies while they are in a contact that no frame shows; `levels` are those of the frames (k, n)."""
+        assert block.collision is not None
+        found = passages(block.collision.crossings)
+        for row, (k, pairs) in enumerate(self._members.items()):
+            mine = np.flatnonzero(np.isin(found.pair, pairs))
+            if len(mine):
+                frames = np.repeat(found.frame[mine], 2)
+                times = np.stack([found.begin[mine, 1], found.end[mine, 1]], axis=1).reshape(-1)
+                after = levels[row, np.maximum(found.frame[mine] - block.first - 1, 0)]
+                shown = np.stack([np.full(len(mine), Level.CONTACT), after], axis=1).reshape(-1)
+                colors = column("Mesh3D", "albedo_factor", palettes[row][shown], 1)
+                path = body_path(self._scene, self._scene.bodies[k])
+                self._chunks.add(path, index_of(times, frames), [colors])
 
     def _beams(self, block: FrameBlock, kind: str, points: Floats) -> None:
         """Draw lines from the sensors of a kind to the points (n, S, 3) that they read; NaN is none."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from replay.collision.columns import CollisionColumns
 from replay.kinematics.linkage import WORLD
-from replay.logs.mcap_writer import MessageRows
+from replay.logs.mcap_writer import MessageRows, rows_of_chunk
 from replay.logs.wire import MessageShape, Slot, shape_of
 from replay.numerics.arrays import Column
 from replay.numerics.columns import Field, components
@@ -49,21 +49,25 @@ class FrameTopic:
     shape: MessageShape
     columns: Callable[[FrameBlock], Columns]
 
-    def encode(self, block: FrameBlock, channel: int) -> MessageRows:
-        """Return the block's messages as records of an MCAP channel."""
-        rows = MessageRows(channel, block.time, block.first, self.shape.length)
-        self.shape.fill(rows.data)
-        written: dict[int, Slot] = {}
-        for path, values in self.columns(block).items():
-            slot = self.shape.slots.get(path)
-            if slot is None:  # an array without elements
-                continue
-            same = written.setdefault(id(values), slot)  # one time stamp stands in many places
-            if same is not slot and same.is_like(slot):
-                slot.copy(rows.data, same)
-            else:
-                slot.write(rows.data, values)
-        return rows
+    def encode(self, block: FrameBlock, channel: int) -> Iterator[MessageRows]:
+        """Yield the block's messages as records of an MCAP channel, as many at once as go into a chunk."""
+        columns = self.columns(block)
+        step = rows_of_chunk(self.shape.length)
+        for first in range(0, len(block.time), step):
+            part = slice(first, first + step)
+            rows = MessageRows(channel, block.time[part], block.first + first, self.shape.length)
+            self.shape.fill(rows.data)
+            written: dict[int, Slot] = {}
+            for path, values in columns.items():
+                slot = self.shape.slots.get(path)
+                if slot is None:  # an array without elements
+                    continue
+                same = written.setdefault(id(values), slot)  # one time stamp stands in many places
+                if same is not slot and same.is_like(slot):
+                    slot.copy(rows.data, same)
+                else:
+                    slot.write(rows.data, values[part])
+            yield rows
 
 
 def frame_topics(layout: Layout, *, collision: bool, kinds: Mapping[str, Collection[Field]]) -> Iterator[FrameTopic]:
@@ -160,7 +164,20 @@ def _transforms(layout: Layout) -> Callable[[FrameBlock], Columns]:
 
 def _collision(block: FrameBlock) -> Columns:
     assert block.collision is not None
-    return {field.name: getattr(block.collision, field.name) for field in block.collision.fields()}
+    return {field.name: _values(block, block.collision, field) for field in block.collision.fields()}
+
+
+def _values(block: FrameBlock, columns: Any, field: Field) -> Column:
+    """Return a column, or one that tells nothing in place of one that an older recording did not have."""
+    values: Column | None = getattr(columns, field.name)
+    if values is not None:
+        return values
+    first = columns.fields()[0]
+    shape = getattr(columns, first.name).shape
+    if field.each != first.each:
+        shape = (*shape, len(getattr(block.layout, field.each)))
+    shape = (*shape, len(field.letters)) if field.letters else shape
+    return np.broadcast_to(np.array(field.nothing, dtype=field.type), shape)
 
 
 def _reading(kind: str, sensor: int) -> Callable[[FrameBlock], Columns]:

@@ -104,7 +104,8 @@ class McapWriter:
             encode(events),
         )
         for topic, channel in self._topics:
-            self._log.rows(topic.encode(block, channel))
+            for rows in topic.encode(block, channel):
+                self._log.rows(rows)
         self._file.flush()
 
     def finish(self) -> None:

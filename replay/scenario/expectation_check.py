@@ -16,9 +16,10 @@ from replay.language.node import Place
 from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import Between, PairExpectation
 from replay.scenario.layout import Layout
+from replay.scenario.meetings import Clearances, Meetings, Seen, seen
 from replay.scenario.names import matches
 from replay.scenario.source import ScenarioProvenance
-from replay.scenario.tallies import Begin, Count, Extremes, Tally
+from replay.scenario.tallies import Count, Extremes, Tally
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
 
@@ -53,7 +54,7 @@ class _Check:
     text: str
     path: tuple[str | int, ...]
     what: str
-    take: Callable[[_Block], Floats]
+    take: Callable[[_Block], Any]
     state: Tally
 
 
@@ -109,11 +110,10 @@ class ExpectationCheck:
         columns = matching_pairs(self._layout.pairs, expected.pair)
         about = " | ".join(expected.pair)
 
-        def reaches(level: Level) -> Callable[[_Block], Floats]:
-            def take(block: _Block) -> Floats:
+        def reaches(level: Level) -> Callable[[_Block], Seen]:
+            def take(block: _Block) -> Seen:
                 assert block.collision is not None
-                reached: Floats = np.any(block.collision.level[:, columns] >= level, axis=1).astype(np.float64)
-                return reached
+                return seen(block.collision, columns, level)
 
             return take
 
@@ -121,18 +121,20 @@ class ExpectationCheck:
             begin, end = expected.contact.between
             window = (round(begin * 1e9), round(end * 1e9))
             text = f"{about}: contact begins between {begin:.6g} s and {end:.6g} s"
-            self._checks.append(_Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), Begin(window)))
+            self._checks.append(
+                _Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), Meetings(window=window))
+            )
         elif expected.contact is not None:
             text = f"{about}: contact {expected.contact}"
-            state = Count(expected.contact)
+            state = Meetings(expected.contact)
             self._checks.append(_Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), state))
         if expected.bounds is not None:
-            text, state = f"{about}: bounds {expected.bounds}", Count(expected.bounds)
+            text, state = f"{about}: bounds {expected.bounds}", Meetings(expected.bounds)
             self._checks.append(_Check(text, (*path, "bounds"), "bounds meet", reaches(Level.BOUNDS), state))
         if expected.clearance is not None:
             least = expected.clearance.min
 
-            def clearance(block: _Block) -> Floats:
+            def clearance(block: _Block) -> tuple[Floats, Floats, Seen]:
                 assert block.collision is not None
                 part = block.collision.clearance[:, columns]
                 known = block.collision.evaluated[:, columns]
@@ -140,13 +142,16 @@ class ExpectationCheck:
                 values = np.where(block.collision.level[:, columns] == Level.CONTACT, 0.0, values)
                 smallest = np.min(values, axis=1, initial=math.inf)
                 unknown = np.isinf(smallest) | (complete & ~known.all(axis=1) & (smallest > 0.0))
-                result: Floats = np.where(unknown, math.nan, smallest)
-                return result
+                bounds = np.full(len(part), math.nan)
+                if block.collision.clearance_bound is not None:
+                    bounds = np.fmin.reduce(block.collision.clearance_bound[:, columns], axis=1)
+                contact = seen(block.collision, columns, Level.CONTACT)
+                return np.where(unknown, math.nan, smallest), bounds, contact
 
             complete = self._clearance != "near" or least > self._margin
-            bounds = Extremes("m", low=least, complete=complete)
+            tally = Clearances(Extremes("m", low=least, complete=complete))
             text = f"{about}: clearance >= {least:.6g} m"
-            self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, bounds))
+            self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, tally))
 
     def _add_reading(self, path: tuple[str | int, ...], kind: str, written: Any, expected: Expected) -> None:
         name = getattr(written, kind)

@@ -19,6 +19,8 @@ METHOD_REVISIONS: Final = {
     "collision.pieces.exact": 3,
     "collision.pieces.convex": 1,
     "collision.pieces.hull": 1,
+    "collision.between.proven": 1,
+    "collision.between.sampled": 1,
 } | {f"{kind.name}.{method}": revision for kind in KINDS.values() for method, revision in kind.revisions.items()}
 """Bumped when a method's results change beyond the shipped rules; recorded with every result."""
 
@@ -35,6 +37,8 @@ class CollisionMethod(Part):
     """How a concave shape is collided: by its triangles, by convex pieces, or by its convex hull."""
     clearance: Literal["near", "never", "always"] = "near"
     """Which clearances are computed: those within collision.margin, none, or all."""
+    between: Literal["proven", "sampled"] = "proven"
+    """Between two frames, contacts are proven absent or found with their time; or frames alone are looked at."""
 
 
 class _Model(Part):
@@ -54,7 +58,7 @@ class _Model(Part):
         Where savings were off, "savings" says so: last digits of some columns may differ, see `simulation.simulate`.
         """
         result = {}
-        for option in ("bounds", "narrowphase", "pieces"):
+        for option in ("bounds", "narrowphase", "pieces", "between"):
             choice = getattr(self.collision, option)
             result[f"collision.{option}"] = f"{choice}@{METHOD_REVISIONS[f'collision.{option}.{choice}']}"
         result["collision.clearance"] = self.collision.clearance
@@ -77,7 +81,9 @@ else:
     Model = with_keys(_Model, **_keys)
 
 _COLLISION = {
-    "thesis2015": CollisionMethod(bounds="obb_vertices", narrowphase="gjk", pieces="convex", clearance="never")
+    "thesis2015": CollisionMethod(
+        bounds="obb_vertices", narrowphase="gjk", pieces="convex", clearance="never", between="sampled"
+    )
 }
 BUILTIN_MODELS: Final = {
     name: Model(collision=collision, **{kind.name: kind.models[name] for kind in KINDS.values() if name in kind.models})

@@ -1,9 +1,9 @@
-"""What a reader should know of a scenario although it is valid: what its end cuts off, and logs that end before it."""
+"""What a reader should know of a scenario although it is valid: what its end cuts off, short logs, what frames miss."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -14,12 +14,21 @@ from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.collision.pairs import CollisionBody
+    from replay.geometry.solid import Solid
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
 
 
-def notes(scenario: Scenario, model: Model | None = None) -> list[Problem]:
-    """Return the notes on a scenario, each with its place; a model replaces the scenario's own."""
+def notes(
+    scenario: Scenario, *, model: Model | None = None, solids: Mapping[tuple[str, str], Solid] | None = None
+) -> list[Problem]:
+    """Return the notes on a scenario, each with its place.
+
+    Args:
+        scenario: as loaded.
+        model: replaces the scenario's own.
+        solids: shapes by link and name, in the links' frames; all that need no mesh file when left out.
+    """
     end = float(scenario.duration)
     after = f"after the scenario's end at {end:.6g} s"
     problem = scenario.provenance.problem
@@ -40,6 +49,11 @@ def notes(scenario: Scenario, model: Model | None = None) -> list[Problem]:
         if isinstance(window, Between) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
     found.extend(_sensor_notes(scenario, model or scenario.model))
+    if (model or scenario.model).collision.between == "sampled":
+        from replay.scenario.scene import primitive_solids
+        from replay.scenario.speed_notes import speed_notes
+
+        found.extend(speed_notes(scenario, primitive_solids(scenario) if solids is None else solids))
     return found
 
 

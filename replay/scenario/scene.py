@@ -164,6 +164,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         sensors={kind: tuple(sensor.name for sensor in found) for kind, found in sensors.items()},
     )
     _check_expectations(scenario, layout)
+    solids = {_link_and_shape(shape.name): shape.solid for shape in scene_shapes}
     return Scene(
         scenario=scenario,
         model=model,
@@ -177,7 +178,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         sensors=sensors,
         layout=layout,
         notes=(
-            *(note.message for note in notes(scenario, model)),
+            *(note.message for note in notes(scenario, model=model, solids=solids)),
             *mesh_notes,
             *piece_notes(bodies, model.collision.pieces),
         ),
@@ -216,6 +217,21 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
     if problems:
         raise ScenarioError(problems)
     return tuple(sorted(found, key=lambda shape: shape.name)), tuple(notes)
+
+
+def primitive_solids(scenario: Scenario) -> dict[tuple[str, str], Solid]:
+    """Return the shapes that need no mesh file by link and name, in their links' frames."""
+    return {
+        (link, name): _primitive(shape).transformed(shape.pose.transform())
+        for link, entry in scenario.links.items()
+        for name, shape in entry.shapes.items()
+        if not isinstance(shape, shapes.MeshPart)
+    }
+
+
+def _link_and_shape(name: str) -> tuple[str, str]:
+    link, _, shape = name.partition("/")
+    return link, shape
 
 
 def _primitive(shape: shapes.ShapePart) -> Solid:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from replay.numerics.arrays import Floats, Integers
 class Tally(Protocol):
     """Takes a quantity's values frame by frame and judges them in the end."""
 
-    def update(self, time_ns: Integers, values: Floats) -> None:
-        """Take the values (n,) of n frames at times (n,) [ns]; a NaN is no value."""
+    def update(self, time_ns: Integers, values: Any, /) -> None:
+        """Take what is followed in n frames at times (n,) [ns]: values (n,), of which a NaN is none, or as it says."""
 
     def result(self, what: str) -> tuple[bool, str]:
         """Return whether the expectation held, and the detail."""
@@ -51,26 +51,6 @@ class Count:
             return self.count == self.frames, text
         text += "" if self.first is None else f", first at {shown_seconds(self.first)}"
         return (self.count == 0) == (self.when == "never"), text
-
-
-@dataclass
-class Begin:
-    """The first frame in which something was so (1), and the window [ns] it is expected in."""
-
-    window: tuple[int, int]
-    first: int | None = None
-
-    def update(self, time_ns: Integers, values: Floats) -> None:
-        """See `Tally`."""
-        so = values > 0.0
-        if self.first is None and so.any():
-            self.first = int(time_ns[int(np.argmax(so))])
-
-    def result(self, what: str) -> tuple[bool, str]:
-        """See `Tally`."""
-        if self.first is None:
-            return False, f"{what} in no frame"
-        return self.window[0] <= self.first <= self.window[1], f"{what} begins at {shown_seconds(self.first)}"
 
 
 @dataclass

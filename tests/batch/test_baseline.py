@@ -77,6 +77,22 @@ def test_what_and_why_is_logged_and_unneeded_meshes_go(run, tmp_path):
     assert not list(tmp_path.glob(".staging*"))
 
 
+def test_meshes_stay_while_a_baseline_that_may_need_them_cannot_be_read(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a", "b"), reason="first", now=NOW)
+    (mesh,) = (tmp_path / "objects").iterdir()
+    unknown = tmp_path / "objects" / ("0" * 64)
+    unknown.write_bytes(b"of the one that cannot be read")
+    whole = baseline.recording("a").read_bytes()
+    baseline.recording("a").write_bytes(whole[:-100])
+    baseline.store(entries(run, "b"), reason="second", now=NOW)
+    assert mesh.is_file()
+    assert unknown.is_file()
+    baseline.recording("a").write_bytes(whole)
+    baseline.store(entries(run, "b"), reason="third", now=NOW)
+    assert list((tmp_path / "objects").iterdir()) == [mesh]
+
+
 def test_nothing_changes_when_one_of_them_cannot_be_stored(run, tmp_path):
     baseline = Baseline(tmp_path)
     baseline.store(entries(run, "a"), reason="first", now=NOW)

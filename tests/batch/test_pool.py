@@ -1,6 +1,7 @@
 """Tasks that crash, hang, eat memory or leave children do not disturb the others."""
 
 import contextlib
+import queue
 import subprocess
 import sys
 import time
@@ -8,8 +9,9 @@ import time
 import psutil
 import pytest
 
-from replay.batch.pool import Pool
+from replay.batch.pool import Pool, _Worker
 from replay.batch.task import Ending, Task
+from replay.batch.worker import Ready, Start
 from replay.errors import InvalidValue
 from tests.batch.tasks import PrepareTogether, behave, eat_and_forget_nothing, slow_start
 
@@ -142,6 +144,25 @@ def test_memory_is_limited_also_where_a_task_is_over_before_anyone_looks():
     assert "above the limit 300 MiB" in ended["again"].reason
     assert ended["quick"].memory > 300 << 20
     assert 0 < ended["small"].memory < 300 << 20
+
+
+def test_a_free_worker_may_keep_half_of_what_a_task_may_have():
+    inbox = queue.SimpleQueue()
+    worker = _Worker(Start(behave, None), inbox)
+    try:
+        found, message = inbox.get(timeout=60.0)
+        assert found is worker and message == Ready()
+        worker.ready = True
+        used = worker._resident()
+        for share, broken in ((0.4, False), (0.6, True), (0.9, True), (1.1, True)):
+            limit = worker.broken_limit(None, int(used / share))
+            assert (limit is not None and limit[0] is Ending.MEMORY) == broken
+        worker.task = Task("a", ("return", 1))
+        for share, broken in ((0.6, False), (0.9, False), (1.1, True)):
+            assert (worker.broken_limit(None, int(used / share)) is not None) == broken
+        assert worker.broken_limit(None, None) is None
+    finally:
+        worker.stop()
 
 
 def test_memory_that_could_not_be_watched_is_told():

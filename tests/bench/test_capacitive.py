@@ -3,9 +3,12 @@
 import math
 
 import numpy as np
+import pytest
 
 from replay.bench import capacitive
 from replay.bench.inputs import box_surface
+
+pytestmark = pytest.mark.compiled  # it measures them
 
 
 def test_every_method_on_a_box():

@@ -9,6 +9,8 @@ from replay.bench.hard_pairs import FAMILIES, hard_pairs
 from replay.bench.report import Report
 from replay.bench.truth import placed, proven_distance, signed_distance
 
+pytestmark = pytest.mark.compiled  # it measures them
+
 ABSENT = Engine("absent", "a_package_nobody_has", lambda *_: None)
 
 

@@ -11,6 +11,8 @@ from replay.bench.cone_truth import nearest_in_cone
 from replay.bench.inputs import box_surface, torus
 from replay.geometry.solid import signed_volume
 
+pytestmark = pytest.mark.compiled  # it measures them
+
 
 def test_every_method_on_a_small_torus():
     rows = distance.on_mesh("torus", torus(400), queries=6, counts=(1, 61), rounds=1)

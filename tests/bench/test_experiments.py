@@ -13,6 +13,8 @@ from replay.bench.experiments.measured import DELTA, DELTA_STRAY, PLATES, SELF, 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 
+pytestmark = pytest.mark.compiled  # it measures them
+
 FOLDER = Path(__file__).parents[2] / "scenarios" / "experiments"
 BENCH = Bench(FOLDER)
 OFFSET_READINGS = (SELF, SELF_STRAY, DELTA, DELTA_STRAY)

@@ -3,10 +3,13 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from replay.bench import pipeline
 from replay.bench.runner import Readings
 from replay.errors import ScenarioError
+
+pytestmark = pytest.mark.compiled  # it measures them
 
 
 def test_all_models_and_the_peer(small):

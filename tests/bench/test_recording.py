@@ -8,6 +8,8 @@ import pytest
 from replay.bench import diff, recording, shipped, start
 from replay.bench.measure import Row
 
+pytestmark = pytest.mark.compiled  # it measures them
+
 METHODS = (
     recording.PLAIN,
     recording.LOG,

@@ -3,8 +3,11 @@
 import copy
 
 import numpy as np
+import pytest
 
 from replay.bench import savings
+
+pytestmark = pytest.mark.compiled  # it measures them
 
 
 def test_rules_are_counted_and_results_are_the_same(small):

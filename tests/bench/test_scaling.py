@@ -4,9 +4,12 @@ import json
 import math
 
 import numpy as np
+import pytest
 
 from replay.bench import broad_phase, scaling
 from replay.bench.report import Report
+
+pytestmark = pytest.mark.compiled  # it measures them
 
 
 def test_every_law_has_points_and_an_exponent(small, monkeypatch):

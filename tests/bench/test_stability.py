@@ -2,10 +2,14 @@
 
 import math
 
+import pytest
+
 from replay.bench import hard_sensing, stability
 from replay.bench.arena import ask
 from replay.bench.contestants import contestants
 from tests.bench import misbehaving
+
+pytestmark = pytest.mark.compiled  # it measures them
 
 QUESTIONS = [{"family": "f", "number": k, "truth": 1.0 + k, "size": 1.0} for k in range(3)]
 

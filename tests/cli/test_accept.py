@@ -3,6 +3,8 @@
 import json
 import re
 
+import pytest
+
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from tests.batch import scenes
@@ -55,3 +57,23 @@ def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     assert run([*accept, "--yes"]) is ExitCode.INVALID
     assert "interrupted" in capsys.readouterr().err
     assert run(["accept", str(tmp_path), "--baseline", str(base)]) is ExitCode.INVALID
+
+
+@pytest.mark.parametrize("changed", ["model", "text", "nothing"])
+def test_a_run_of_another_model_or_text_is_accepted_anew_although_it_reads_the_same(tmp_path, capsys, changed):
+    path = scenes.write(tmp_path / "in", "a")
+    out, base = tmp_path / "out", tmp_path / "base"
+    accept = ["accept", str(out), "--baseline", str(base), "--yes", "--reason", "x"]
+    command = ["run", str(tmp_path / "in"), "-o", str(out), "--no-rrd"]
+    assert run(command) is ExitCode.FINE
+    assert run(accept) is ExitCode.FINE
+    model = tmp_path / "model.yaml"
+    model.write_text("capacitive: {method: tree, rtol: 1e-3}\n")  # nothing there is sensed by it
+    if changed == "text":
+        path.write_text(path.read_text() + "# as before\n")
+    more = ["--model", str(model)] if changed == "model" else []
+    assert run([*command, "--overwrite", *more]) is ExitCode.FINE
+    capsys.readouterr()
+    assert run(accept) is ExitCode.FINE
+    counts = "0 to be accepted, 1 unchanged" if changed == "nothing" else "1 to be accepted, 0 unchanged"
+    assert counts in capsys.readouterr().out

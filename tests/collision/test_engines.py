@@ -41,6 +41,7 @@ def certified(a, b, T_a_b):
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.compiled
 def test_engines_agree_on_shipped_scenarios(path):
     """Where they differ by more than the band, our answer is the one that is proven, and few pairs are meant.
 
@@ -68,6 +69,7 @@ def test_engines_agree_on_shipped_scenarios(path):
         assert own.clearance[frame, p] == pytest.approx(certified(a, b, T_a_b), rel=1e-12)
 
 
+@pytest.mark.compiled
 def test_some_scenario_has_contacts_and_some_has_near_misses():
     """Else the comparison above would be of nothing."""
     levels = set()

@@ -13,6 +13,7 @@ from replay.collision.gjk import Status, distance, intersect
 from replay.collision.support import make_sets
 from replay.errors import InvalidValue
 from replay.geometry.primitives import cone, cylinder
+from tests.amounts import cases
 from tests.collision import motions, reference
 
 UNIT = reference.box((1, 1, 1))
@@ -29,7 +30,7 @@ def run_boxes(n, seed):
     halves = rng.uniform(0.05, 1.0, (200, 3)) * 10.0 ** rng.integers(-1, 1, (200, 1))
     bodies = sets([reference.box(2 * half) for half in halves])
     which = rng.integers(0, len(halves), (n, 2))
-    few = np.stack([motions.rotation(rng) for _ in range(500)] + [np.identity(3)] * 100)
+    few = np.stack([motions.rotation(rng) for _ in range(cases(500))] + [np.identity(3)] * 100)
     rotations = few[rng.integers(0, len(few), n)]
     reach = np.sqrt((halves[which[:, 0]] ** 2).sum(1)) + np.sqrt((halves[which[:, 1]] ** 2).sum(1))
     positions = rng.normal(size=(n, 3)) * (0.35 * reach)[:, None]
@@ -126,7 +127,7 @@ def test_tables_find_what_looking_at_every_vertex_finds():
     assert all(several.side[0] == 0 for several in looked_at)
     work = gjk_exact.workspace()
     met = 0
-    for _ in range(400):
+    for _ in range(cases(400)):
         i, j = rng.integers(0, len(shapes), 2)
         turn = motions.rotation(rng) if rng.random() < 0.7 else np.identity(3)
         place = 20.0 * np.identity(3)[rng.integers(3)] if rng.random() < 0.3 else 12.0 * rng.normal(size=3)
@@ -213,7 +214,7 @@ def test_degenerate_sets_on_a_lattice_agree_with_a_linear_programme():
     """Few integer points: most simplices are flat, collinear or repeated, and a third of the pairs just touch."""
     rng = np.random.default_rng(13)
     met = 0
-    for _ in range(400):
+    for _ in range(cases(400)):
         a, b = (rng.integers(-1, 3, (rng.integers(1, 9), 3)).astype(float) for _ in range(2))
         b += rng.integers(-2, 3, 3) * np.array([1.0, 1.0, 0.5])
         # weights u, v >= 0 of sum 1 with sum u a = sum v b
@@ -230,7 +231,7 @@ def test_degenerate_sets_on_a_lattice_agree_with_a_linear_programme():
 points = st.lists(st.tuples(*[st.floats(-10, 10, allow_subnormal=False)] * 3), min_size=1, max_size=9).map(np.array)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 @given(points, points, st.integers(0, 2**32 - 1))
 def test_answers_carry_their_proof(a, b, seed):
     pose_a = motions.random_pose(np.random.default_rng(seed))

@@ -53,6 +53,7 @@ def crowd(rng, *, trees, frames, away=0.0):
 @pytest.mark.parametrize("bounds", BOUNDS)
 @pytest.mark.parametrize("clearance", ["never", "near"])
 @pytest.mark.parametrize("away", [0.0, 1e6])
+@pytest.mark.compiled
 def test_a_tree_over_all_bodies_does_not_show(monkeypatch, bounds, clearance, away):
     rng = np.random.default_rng(21)
     bodies, linkage, poses = crowd(rng, trees=14, frames=24, away=away)
@@ -99,7 +100,7 @@ def test_near_pairs_are_those_whose_swept_boxes_meet():
     starts = rng.uniform(0, 5, (200, 3))
     poses = np.stack([transforms.from_translation(starts + shift * rng.normal(size=(200, 3))) for shift in (0, 0.2, 1)])
     links = linkage.forward(np.zeros((3, 0)), poses)
-    found = near_pairs(engine._volumes, engine._links, links, 0.1)
+    found = near_pairs(engine._volumes, engine._links, links, 0.1, np.zeros(len(engine._links)))
     reach = engine._volumes.radius[:, None] + 0.05
     low, high = poses[..., :3, 3].min(axis=0) - reach, poses[..., :3, 3].max(axis=0) + reach
     meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
@@ -108,6 +109,7 @@ def test_near_pairs_are_those_whose_swept_boxes_meet():
     assert len(found) == len(a) > 300
 
 
+@pytest.mark.compiled
 def test_candidates_grow_with_the_bodies_not_with_their_pairs():
     looked_at = []
     for count in (100, 800):

@@ -67,6 +67,7 @@ SOLIDS = (
 )
 
 
+@pytest.mark.compiled
 def test_levels_and_clearances_agree_with_brute_force():
     rng = np.random.default_rng(5)
     poses = drift(rng, 12, len(SOLIDS), 0.2)
@@ -95,6 +96,7 @@ def test_levels_and_clearances_agree_with_brute_force():
 
 
 @pytest.mark.parametrize("bounds", BOUNDS)
+@pytest.mark.compiled
 def test_bounds_level_is_what_the_volumes_say_and_loses_no_contact(bounds):
     rng = np.random.default_rng(6)
     poses = drift(rng, 60, len(SOLIDS), 0.5)
@@ -123,6 +125,7 @@ def test_world_boxes_follow_the_world():
     assert level.tolist() == [Level.CLEAR, Level.BOUNDS]
 
 
+@pytest.mark.compiled
 def test_savings_do_not_show():
     """Blocks cut elsewhere, dwells, and frames in another order give the same levels and clearances."""
     rng = np.random.default_rng(7)
@@ -228,6 +231,7 @@ def test_far_from_the_world_origin_reads_the_same():
 
 
 @pytest.mark.parametrize("pieces", ["exact", "hull"])
+@pytest.mark.compiled
 def test_phantom_agrees_with_fcl(pieces):
     """Both engines on random poses; fcl's convex distances are good to 1e-6, so that band is left out."""
     rng = np.random.default_rng(11)

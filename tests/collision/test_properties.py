@@ -11,6 +11,7 @@ from replay.collision.pairs import CollisionBody, PairRules
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.hull import convex_hull
 from replay.geometry.solid import Solid
+from tests.amounts import cases
 from tests.collision import motions, reference, scenes
 
 BOUNDS = ("obb", "obb_vertices", "aabb", "sphere")
@@ -66,7 +67,7 @@ def way_apart(a, b, pose_a, pose_b, rng):
     return pose_b, direction / np.sqrt((direction**2).sum())
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=cases(150), deadline=None)
 @given(kinds, kinds, angles, seeds)
 def test_moving_apart_never_brings_nearer(kind_a, kind_b, angle, seed):
     """Along any direction the distance is convex and grows by the way at most; along the separating one it grows."""
@@ -96,7 +97,7 @@ def test_moving_apart_never_brings_nearer(kind_a, kind_b, angle, seed):
         assert distance(a, b, pose_a=pose_a, pose_b=touching).distance <= ROUNDING * size
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=cases(150), deadline=None)
 @given(kinds, kinds, angles, seeds)
 def test_all_poses_at_once_say_what_one_by_one_does(kind_a, kind_b, angle, seed):
     """The batch works in a's frame, with tables; one by one is about a common origin, without."""
@@ -126,7 +127,7 @@ def solid(kind, rng):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=cases(40), deadline=None)
 @given(st.sampled_from(["box", "hull", "many vertices"]), st.sampled_from(["box", "hull"]), angles, seeds)
 def test_both_engines_keep_order_motion_and_moving_apart(engine, kind_a, kind_b, angle, seed):
     """One pair in a row of frames: b moves away; then the same with a and b exchanged, and elsewhere in the world."""
@@ -152,7 +153,7 @@ def test_both_engines_keep_order_motion_and_moving_apart(engine, kind_a, kind_b,
         assert (other.level[sure, 0] != Level.CONTACT).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=cases(60), deadline=None)
 @given(st.lists(kinds, min_size=3, max_size=5), angles, seeds)
 def test_no_volume_loses_a_contact(several, angle, seed):
     """Bodies at, in and just off each other over some frames: each volume finds the contacts that no pruning finds."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from replay.logs.mcap_reader import McapLog
-from replay.logs.mcap_records import PREAMBLE
+from replay.logs.mcap_records import PREAMBLE, Schema
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import PartFile
 from replay.logs.protobuf import message_type
@@ -37,6 +37,7 @@ def write(
     *,
     rename: Callable[[str], str | None] = lambda topic: topic,
     provenance: Callable[[dict[str, Any]], None] = lambda known: None,
+    schema: Callable[[Schema], Schema] = lambda schema: schema,
 ) -> Path:
     """Write a recording again.
 
@@ -45,6 +46,7 @@ def write(
         edits: values to change.
         rename: new name of a topic, or None to leave it out.
         provenance: changes the metadata in place.
+        schema: what stands in place of a schema; messages are not written anew for it.
     """
     with McapLog(source) as log:
         file = PartFile(target, overwrite=True)
@@ -58,8 +60,8 @@ def write(
                 writer.metadata(name, texts)
         for attachment in log.attachments:
             writer.attachment(attachment.name, attachment.media_type, log.attachment(attachment))
-        for _, schema in sorted(log.schemas.items()):
-            writer.schema(schema)
+        for _, before in sorted(log.schemas.items()):
+            writer.schema(schema(before))
         numbers = {}
         for old, channel in sorted(log.channels.items()):
             name = rename(channel.topic)
@@ -75,8 +77,8 @@ def write(
             for item in edits:
                 k = item.frame - begin
                 if item.topic == channel.topic and 0 <= k < len(messages):
-                    schema = log.schemas[channel.schema_id]
-                    messages[k] = _edited(message_type(str(source), schema.name, schema.data), messages[k], item)
+                    kind = log.schemas[channel.schema_id]
+                    messages[k] = _edited(message_type(str(source), kind.name, kind.data), messages[k], item)
             if run.channel in numbers:
                 sequence = range(begin, begin + len(messages))
                 writer.messages(numbers[run.channel], run.time.tolist(), sequence, messages)

@@ -27,7 +27,7 @@ def run(capsys, monkeypatch):
 def test_the_command_says_it_by_its_exit_code(folders, tmp_path, run):
     same = folders / "a" / "same" / "same.mcap", folders / "b" / "same" / "same.mcap"
     other = folders / "a" / "other" / "other.mcap", folders / "b" / "other" / "other.mcap"
-    assert run(*same) == (0, "same: made_up: all 55 signals equal in 100 frames\n", "")
+    assert run(*same) == (0, "same: made_up: all 59 signals equal in 100 frames\n", "")
     code, out, _ = run(*other, "--format", "json", "--html", tmp_path / "new" / "d.html", "--junit", tmp_path / "d.xml")
     assert (code, json.loads(out)["verdict"]) == (1, "different")
     assert "contact begins" in (tmp_path / "new" / "d.html").read_text(encoding="utf-8")
@@ -95,7 +95,7 @@ def test_of_run_folders_what_their_last_run_made_is_compared(folders, tmp_path, 
     report(tmp_path / "a", same="passed")
     report(tmp_path / "b", same="broken", new="failed", other="interrupted")
     code, out, _ = run(tmp_path / "a", tmp_path / "b")
-    assert (code, out) == (0, "same: same: all 55 signals equal in 100 frames\n")
+    assert (code, out) == (0, "same: same: all 59 signals equal in 100 frames\n")
     report(tmp_path / "b", same="passed", new="passed")
     assert run(tmp_path / "a", tmp_path / "b")[0] == 1
     assert run(folders / "a", tmp_path / "b")[1].endswith("0 of 1 scenario differ, 2 missing, 1 extra\n")

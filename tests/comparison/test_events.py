@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from replay.collision.columns import CollisionColumns
 from replay.comparison.events import StateTrack, _least_shift, match, tracks
 from replay.sensing.distance.columns import DistanceColumns
+from tests.amounts import cases
 
 LEVEL = CollisionColumns.fields()[0]
 STATUS, SHAPE, TRIANGLE = (DistanceColumns.fields()[k] for k in (0, 5, 6))
@@ -41,7 +42,7 @@ def test_least_shift_is_the_least_of_all_correspondences_in_order(a, b):
     assert total == best
 
 
-@settings(max_examples=200)
+@settings(max_examples=cases(200))
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), max_size=40))
 def test_events_are_told_once_and_nothing_is_told_of_equal_columns(columns):
     a, b = ([pair[k] for pair in columns] for k in (0, 1))

@@ -9,6 +9,7 @@ import replay
 from replay.comparison.diff import FRAMES, compare
 from replay.comparison.difference import DiffVerdict, Fate
 from replay.comparison.rules import Rule, Rules, Tolerance
+from replay.recording.events import Events, Transition
 from tests.comparison import made_up
 from tests.comparison.made_up import altered, only_frames, with_names, with_provenance
 
@@ -101,6 +102,39 @@ def test_an_extra_pair_is_named_and_the_others_are_matched_by_name():
     assert found.verdict is DiffVerdict.DIFFERENT
 
 
+def test_other_event_messages_of_equal_columns_are_a_difference():
+    what = Transition("contact", True, PAIR, "/collision")
+    time, frame = BASELINE.time[[40, 60]], np.array([40, 60])
+    events = Events(time, frame, np.array([0, 1]), (what, dataclasses.replace(what, begins=False)))
+    base = dataclasses.replace(BASELINE, events=events)
+    assert compare(base, dataclasses.replace(BASELINE, events=events)).verdict is DiffVerdict.SAME
+    others = {
+        "2 events, 1 of them only here -> 1 event": events[:1],
+        "2 events, 2 of them only here -> 0": Events.none(),
+        "a frame": dataclasses.replace(events, frame=frame + 1),
+        "a time": dataclasses.replace(events, time=time + 1),
+        "a subject": dataclasses.replace(events, transitions=(what, dataclasses.replace(what, subject="x"))),
+        "an order": events[::-1],
+    }
+    for other in others.values():
+        found = compare(base, dataclasses.replace(BASELINE, events=other))
+        assert found.verdict is DiffVerdict.DIFFERENT
+        (change,) = found.scene
+        assert change.name == "/events"
+        only = len([event for event in events if event not in list(other)])
+        assert change.baseline == f"2 events, {only} of them only here"
+        assert change.candidate.startswith(f"{len(other)} events, ")
+        assert (
+            compare(base, dataclasses.replace(BASELINE, events=other), rules=rules("/events", ignore=True)).scene == ()
+        )
+
+    def move(recording):
+        recording.joint_positions[5, 0] += 1.0
+
+    found = compare(base, dataclasses.replace(altered(BASELINE, move), events=Events.none()))
+    assert len(found.signals) == 1 and found.scene == ()  # they follow from what is told
+
+
 def test_a_renamed_sensor_is_recognised_by_its_readings():
     def tell_apart(recording):
         recording.distance.distance[:, 0] += 0.25
@@ -112,6 +146,26 @@ def test_a_renamed_sensor_is_recognised_by_its_readings():
     assert (new.label, new.same_as) == ("topic /distance/links", ("/distance/left", ""))
     assert found.signals == ()
     assert found.verdict is DiffVerdict.DIFFERENT
+
+
+def test_a_renamed_sensor_is_recognised_where_one_more_shape_renumbers_the_others():
+    def tell_apart(recording):
+        recording.distance.distance[:, 0] += 0.25
+
+    def renumber(recording):
+        seen = recording.distance.shape >= 0
+        recording.distance.shape[seen] += 1
+
+    def another_shape(recording):
+        recording.distance.shape[20, 0] = 0
+
+    baseline = altered(BASELINE, tell_apart)
+    shapes = ("arm/a_new_one", *made_up.LAYOUT.shapes)
+    candidate = with_names(altered(baseline, renumber), shapes=shapes, distance_sensors=("links", "right"))
+    found = compare(baseline, candidate)
+    assert [item.same_as for item in found.missing] == [("/distance/links", "")]
+    other = compare(baseline, altered(candidate, another_shape))
+    assert [item.same_as for item in other.missing] == [None]
 
 
 def test_a_renamed_pair_is_recognised_and_equal_readings_of_several_are_not_guessed():
@@ -341,7 +395,7 @@ def test_public_diff_takes_recordings_and_files(tmp_path):
     found = replay.diff(baseline, made_up.write(same_readings, tmp_path / "b.mcap"))
     assert found.verdict is DiffVerdict.SAME
     assert found.provenance
-    assert found.compared == 55
+    assert found.compared == 59
     grown = replay.diff(baseline, made_up.write(BASELINE, tmp_path / "c.mcap", size=1.5))
     assert [change.name for change in grown.scene] == ["/scene/arm/beam", "/scene/stand/base", "/scene/stand/column"]
     assert grown.verdict is DiffVerdict.DIFFERENT

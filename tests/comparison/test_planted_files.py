@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 import replay
 from replay.cli.exit_codes import ExitCode
@@ -16,6 +17,7 @@ from replay.comparison import wording
 from replay.comparison.difference import DiffVerdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.runs import read_pair
+from replay.logs.mcap_records import Schema
 from replay.recording.reader import read
 from tests.batch import scenes
 from tests.comparison import edited
@@ -201,6 +203,44 @@ def test_what_is_missing_or_another(tmp_path, capsys, source, changes, finding, 
     check(tmp_path, capsys, source, target, line, finding=finding)
 
 
+def without_field(message, field):
+    """Return how a schema loses a field of a message type, as when an older version wrote it."""
+
+    def change(schema):
+        files = FileDescriptorSet.FromString(schema.data)
+        for file in files.file:
+            for kind in file.message_type:
+                kept = [one for one in kind.field if kind.name != message or one.name != field]
+                del kind.field[:]
+                kind.field.extend(kept)
+        return Schema(schema.name, schema.encoding, files.SerializeToString())
+
+    return change
+
+
+def test_a_field_that_a_schema_has_lost_is_a_difference_and_a_new_one_is_told(tmp_path, capsys):
+    fewer = edited.write(PARKING, tmp_path / "b.mcap", schema=without_field("SceneEntity", "frame_locked"))
+    name = "/schemas/scene/entities.frame_locked"
+    check(tmp_path, capsys, PARKING, fewer, f"{name}: field 5, bool -> -", finding=("scene", name))
+    line = f"{name}: - -> field 5, bool"
+    check(tmp_path, capsys, fewer, PARKING, line, finding=("provenance", name), verdict="same")
+
+
+@pytest.mark.parametrize("joint", ["angulation", "table_lift"])
+def test_a_joint_in_another_unit_is_a_difference_although_its_topic_is_the_same_bytes(tmp_path, capsys, joint):
+    units = {}
+
+    def swap(known):
+        layout = known["layout"]
+        at = layout["joints"].index(joint)
+        units["before"] = layout["joint_units"][at]
+        layout["joint_units"][at] = units["after"] = "m" if units["before"] == "rad" else "rad"
+
+    other = edited.write(PARKING, tmp_path / "b.mcap", provenance=swap)
+    line = f"/units/{joint}: {units['before']} -> {units['after']}"
+    check(tmp_path, capsys, PARKING, other, line, finding=("scene", f"/units/{joint}"))
+
+
 def test_a_library_version_is_named_and_leaves_the_verdict(tmp_path, capsys):
     target = edited.write(PARKING, tmp_path / "b.mcap", provenance=lambda known: known["libraries"].update(numpy="9.9"))
     before = read(PARKING).provenance.libraries["numpy"]
@@ -251,6 +291,6 @@ def test_one_extra_pair_of_real_runs(tmp_path, capsys):
     assert run(["diff", *map(str, files)]) is ExitCode.DIFFERENT
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if not line.startswith(("  provenance", "    "))] == [
-        "different: s: 4 signals extra, 1 difference of provenance",
-        "  extra: /collision arm/rod|post/pole (4 signals)",
+        "different: s: 6 signals extra, 1 difference of provenance",
+        "  extra: /collision arm/rod|post/pole (6 signals)",
     ]

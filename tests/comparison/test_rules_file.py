@@ -35,7 +35,7 @@ rules:
   - {signal: "/collision/*", abs: 1e-9, rel: 1, time: 20 ms, nan: fail, zero: signed, reason: r, link: "https://x/1"}
   - {signal: ["/tf/*", "*/d[ab]"], ignore: true, reason: "why", expires: 2027-03-31}
   - {signal: "/distance/*", time: 2 frames, reason: "why"}
-  - {signal: "/capacitive/*", time: 0.5, reason: "why"}
+  - {signal: "/capacitive/*", time: 0.5, bracket: 100 us, reason: "why"}
 """
     rules = read_rules(written(tmp_path, text), today=TODAY)
     assert rules.tolerance("/collision/level/a|b") == Tolerance(1e-9, 1.0, 0.02, 0, "fail", "signed")
@@ -44,7 +44,7 @@ rules:
     assert rules.tolerance("/x/db").ignore
     assert rules.tolerance("/x/dc") == EXACT
     assert rules.tolerance("/distance/s/status") == Tolerance(frames=2)
-    assert rules.tolerance("/capacitive/s/saturated") == Tolerance(time=0.5)
+    assert rules.tolerance("/capacitive/s/saturated") == Tolerance(time=0.5, bracket=1e-4)
 
 
 def test_the_first_rule_that_matches_counts(tmp_path):

@@ -1,6 +1,7 @@
 """Bounding volumes: they contain, they are tight where closed forms say how tight, and bad input is refused."""
 
 import json
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from importlib.util import find_spec
@@ -17,6 +18,7 @@ from replay.geometry.bounds import Obb, fit_aabb, fit_obb, fit_sphere
 from replay.geometry.mesh import load_mesh
 from replay.geometry.principal_axes import covariance_of_points, covariance_of_triangles, eigen
 from replay.numerics import transforms
+from tests.amounts import cases
 
 EPS = np.finfo(float).eps
 PHANTOM = Path(find_spec("pyskindose").submodule_search_locations[0]) / "phantom_data/adult_male.stl"
@@ -150,7 +152,7 @@ def test_covariance_is_that_of_the_sheet() -> None:
     np.testing.assert_allclose(covariance_of_points(points), np.cov(points.T, bias=True), rtol=1e-13)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 @given(st.lists(st.floats(-6, 6), min_size=3, max_size=3), st.integers(0, 2**32), st.booleans())
 def test_eigen(exponents: list[float], seed: int, repeated: bool) -> None:
     values = np.sort(10.0 ** np.array(exponents))
@@ -179,7 +181,7 @@ def brute_force_radius(points: np.ndarray) -> float:
     return float(best)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=cases(60), deadline=None)
 @given(st.integers(1, 9), st.integers(0, 2**32), st.sampled_from(["cloud", "grid", "plane", "line", "shell"]))
 def test_smallest_sphere(count: int, seed: int, kind: str) -> None:
     rng = np.random.default_rng(seed)
@@ -200,6 +202,33 @@ def test_smallest_sphere(count: int, seed: int, kind: str) -> None:
         assert ball.radius == pytest.approx(scale * expected, rel=1e-14, abs=1e-15 * scale + 4 * EPS * far)
 
 
+def test_every_point_is_in_its_sphere_and_box_however_distances_are_rounded() -> None:
+    """What others compute of a point and a volume may be rounded otherwise than by whoever made the volume."""
+    rng = np.random.default_rng(12)
+    for _ in range(cases(300)):
+        points = rng.normal(size=(rng.integers(2, 9), 3)) * 10.0 ** rng.uniform(-3, 3) + rng.normal(size=3)
+        ball, box = fit_sphere(points), fit_aabb(points)
+        x, y, z = (points - ball.center).T
+        ways = (
+            np.sqrt(x * x + y * y + z * z),
+            np.sqrt((z * z + y * y) + x * x),
+            np.array([math.dist(point, ball.center) for point in points]),
+            np.hypot(np.hypot(x, y), z),
+            np.linalg.norm(ball.center - points, axis=1),
+        )
+        for distance in ways:
+            assert (distance <= ball.radius).all()
+        exact = [
+            sum((Fraction(float(a)) - Fraction(float(c))) ** 2 for a, c in zip(point, ball.center, strict=True))
+            for point in points
+        ]
+        assert max(exact) <= Fraction(ball.radius) ** 2
+        assert ball.radius <= math.sqrt(max(exact)) * (1.0 + 16.0 * EPS)
+        for axis in range(3):
+            offsets = [abs(Fraction(float(p)) - Fraction(float(box.center[axis]))) for p in points[:, axis]]
+            assert max(offsets) <= Fraction(float(box.half_widths[axis]))
+
+
 def test_sphere_of_large_sets() -> None:
     sphere = primitives.sphere(0.5, 1e-3).vertices + np.array([3.0, 4.0, 5.0])
     ball = fit_sphere(sphere)
@@ -214,7 +243,7 @@ def test_sphere_of_large_sets() -> None:
     assert ball.radius == pytest.approx(brute_force_radius(touching[:6]), rel=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=cases(100), deadline=None)
 @given(st.integers(1, 50), st.integers(0, 2**32), st.floats(-6, 6), st.floats(0, 1e6))
 def test_aabb(count: int, seed: int, exponent: float, far: float) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * 10.0**exponent + far
@@ -225,7 +254,7 @@ def test_aabb(count: int, seed: int, exponent: float, far: float) -> None:
     np.testing.assert_allclose(2 * box.half_widths, np.ptp(points, axis=0), rtol=1e-14, atol=4 * EPS * far)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=cases(60), deadline=None)
 @given(
     st.integers(1, 40),
     st.integers(0, 2**32),
@@ -290,8 +319,8 @@ def test_obb_is_never_larger(method: str) -> None:
         [(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)],
     ]
     sets = [np.array([(x, y, z) for x, y in prism for z in (0, 1)], dtype=float) for prism in prisms]
-    sets += [rng.normal(size=(rng.integers(4, 12), 3)) for _ in range(400)]
-    sets += [rng.normal(size=(9, 3)) * 10.0 ** rng.uniform(-4, 4, 3) for _ in range(100)]
+    sets += [rng.normal(size=(rng.integers(4, 12), 3)) for _ in range(cases(400))]
+    sets += [rng.normal(size=(9, 3)) * 10.0 ** rng.uniform(-4, 4, 3) for _ in range(cases(100))]
     for points in sets:
         box, along = fit_obb(points, method=method), fit_aabb(points)
         rounding = 1e-14 * np.max(np.abs(along.half_widths))

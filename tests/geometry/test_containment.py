@@ -18,6 +18,7 @@ from replay.geometry.solid import Solid
 from replay.geometry.solid_angle import winding_number
 from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
+from tests.amounts import cases
 
 PHANTOM = Path(find_spec("pyskindose").submodule_search_locations[0]) / "phantom_data/adult_male_reduced_1000t.stl"
 
@@ -93,7 +94,7 @@ def test_cavities_and_overlaps() -> None:
     np.testing.assert_array_equal(contains(nested, points), [True, True, False])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=cases(50), deadline=None)
 @given(st.integers(0, 2**32), st.floats(-6, 6))
 def test_random_tetrahedra(seed: int, exponent: float) -> None:
     rng = np.random.default_rng(seed)

@@ -118,6 +118,7 @@ def test_quads_that_are_not_flat_are_two_surfaces() -> None:
 
 
 @pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.compiled
 def test_copies_that_rounding_has_parted_are_seen(sense) -> None:
     # two closed copies had no open edge that welding could close, and their capacitance was twice what it is
     rng = np.random.default_rng(5)

@@ -31,6 +31,7 @@ def two_cubes(gap: float = 1.0) -> Solid:
     return solid_from_triangles(np.concatenate([cube, cube + np.array([1.0 + gap, 0.0, 0.0])]))
 
 
+@pytest.mark.compiled
 def test_phantom_twice_and_from_cache(cache: Path) -> None:
     solid = load_mesh(PHANTOM, scale=0.01)
     first = decompose(solid)

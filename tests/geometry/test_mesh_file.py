@@ -11,6 +11,7 @@ import trimesh
 from replay.errors import MeshError
 from replay.geometry import glb_file
 from replay.geometry.mesh_file import FORMATS, read_faces
+from tests.amounts import cases
 
 BOX = trimesh.creation.box()
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
@@ -191,7 +192,7 @@ def test_polygons_that_are_not_convex_are_split_rightly():
     assert trimesh.Trimesh(*read_faces("u.obj", straight)).area == pytest.approx(2.0)
     rng = np.random.default_rng(6)
     notched = 0
-    for _ in range(300):
+    for _ in range(cases(300)):
         count = int(rng.integers(4, 40))
         points = star(count, rng)
         rows = "".join("v {:.17g} {:.17g} {:.17g}\n".format(*point) for point in points)

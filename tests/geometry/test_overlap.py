@@ -7,6 +7,7 @@ import pytest
 
 from replay.geometry.bounds import Aabb, Obb, Sphere, aabbs_meet, fit_aabb, fit_obb, fit_sphere, obbs_meet, spheres_meet
 from replay.numerics import transforms
+from tests.amounts import cases
 
 SIGNS = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))
 
@@ -63,7 +64,7 @@ def gap(a: Obb, b: Obb, T: np.ndarray) -> float:
 def test_touching_boxes_meet(far: float) -> None:
     """Corner on corner, corner on face, edge on edge: the common point is rounded, and the boxes still meet."""
     rng = np.random.default_rng(1)
-    for _ in range(3000):
+    for _ in range(cases(3000)):
         a, b = random_box(rng, far), random_box(rng, far)
         kinds = rng.integers(-1, 2, size=(2, 3)).astype(float)  # corner, edge or face of each
         kinds = np.where(kinds == 0, rng.uniform(-1, 1, size=(2, 3)), kinds)
@@ -81,7 +82,7 @@ def test_gaps_are_seen(far: float) -> None:
     """Pairs near contact, against the 15 axes in extended precision: no answer wrong beyond rounding."""
     rng = np.random.default_rng(2)
     met = []
-    for _ in range(2000):
+    for _ in range(cases(2000)):
         a, b = random_box(rng, far), random_box(rng, far)
         T = rigid(rng, 0.0)
         direction = rng.normal(size=3)
@@ -128,7 +129,7 @@ def test_ladder(step: float) -> None:
 def test_no_contact_is_lost(scale: float, far: float) -> None:
     """Bodies that share a point: their volumes meet, whatever kind they are of."""
     rng = np.random.default_rng(3)
-    for _ in range(100):
+    for _ in range(cases(100)):
         clouds = [
             scale * (rng.normal(size=(rng.integers(1, 12), 3)) * 10.0 ** rng.uniform(-6, 0, size=3))
             + scale * far * rng.uniform(-1, 1, size=3)

@@ -14,6 +14,7 @@ from replay.geometry import primitives
 from replay.geometry.convex import convex_sets
 from replay.geometry.solid import Solid, signed_volume
 from replay.numerics import transforms
+from tests.amounts import cases
 
 E = 1e-3
 SHAPES: dict[str, Callable[[], Solid]] = {
@@ -72,7 +73,7 @@ def inside_points(solid: Solid) -> np.ndarray:
     return np.einsum("wk,nkd->nwd", weights, solid.triangles).reshape(-1, 3)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=cases(30), deadline=None)
 @given(lengths, st.floats(-3, 0).map(lambda x: 10.0**x), st.floats(0.1, 3.0), st.floats(0.01, 2 * math.pi))
 def test_chord_error(radius: float, fraction: float, aspect: float, span: float) -> None:
     limit = fraction * radius

@@ -84,6 +84,22 @@ def test_relative_poses_between_trees_against_high_precision():
     np.testing.assert_allclose(relative[:3, 3], [float(v) for v in expected], atol=4e-15)  # 20 m * 2^-53, three terms
 
 
+def test_the_way_counts_every_step_and_the_place_of_each_joint():
+    slide = Joint("slide", JointType.PRISMATIC, (1.0, 0.0, 0.0))
+    base = Link("base", None, transforms.from_translation(np.array([9.0, 9.0, 9.0])), Joint("base"))
+    arm = Link("arm", "base", transforms.from_translation(np.array([3.0, -0.5, 0.0])), slide)
+    hand = Link("hand", "arm", transforms.from_translation(np.array([0.0, 0.0, -4.0])), Joint("hand"))
+    far = Link("far", None, transforms.from_translation(np.array([0.0, 100.0, 0.0])), Joint("far"))
+    linkage = Linkage([base, arm, hand, far])
+    poses = linkage.forward(np.array([[0.0], [-3.0], [1.0]]), np.empty((3, 0, 4, 4)))
+    a, b, c, d = (linkage.link_index(name) for name in ("base", "arm", "hand", "far"))
+    # at -3 the slide brings the arm back to where the base is: rounding is of what was added and taken away
+    assert poses.way(a, b).tolist() == [3.5 + 3.5, 0.5 + 3.5, 4.5 + 3.5]
+    assert poses.way(a, c).tolist() == (poses.way(a, b) + 8.0).tolist() == poses.way(c, a).tolist()
+    assert poses.way(a, d).tolist() == [2.0 * (27.0 + 100.0)] * 3
+    assert poses.way(b, b).tolist() == [0.0] * 3
+
+
 def test_structure_questions():
     names = [("base", None, "fixed"), ("arm", "base", "revolute"), ("hand", "arm", "fixed"), ("wall", None, "fixed")]
     linkage = Linkage([Link(n, p, transforms.identity(), Joint(n, JointType(t))) for n, p, t in names])

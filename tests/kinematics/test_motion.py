@@ -12,6 +12,7 @@ from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.kinematics.motion import Keyframe, Move, Script, Track, Waypoint, plan, sample
 from replay.kinematics.profiles import from_pieces, through_waypoints, trapezoid, trapezoid_time
 from replay.numerics import transforms
+from tests.amounts import cases
 
 
 def linkage(*joints: Joint) -> Linkage:
@@ -53,7 +54,7 @@ def test_positions_hold_before_the_first_and_after_the_last_waypoint():
     acceleration=st.floats(1e-3, 1e2),
     sign=st.sampled_from([-1.0, 1.0]),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 def test_trapezoid_arrives_at_rest_within_its_limits(distance, velocity, acceleration, sign):
     target = 0.25 + sign * distance
     profile = from_pieces(trapezoid(2.0, 0.25, target, velocity, acceleration), 0.25, target)
@@ -128,6 +129,28 @@ def test_a_move_at_exactly_its_limits_is_accepted():
         joint = hinge(lower=-10, upper=10, velocity=rng.uniform(0.01, 3), acceleration=rng.uniform(0.01, 3))
         script = Script(moves=(Move({"hinge": 10.0}), Move({"hinge": -10.0}), Move({"hinge": rng.uniform(-10, 10)})))
         sample(linkage(joint), script, np.array([0.0]))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("excess", "accepted"), [(1e-10, True), (1e-8, False), (1e-6, False), (1e-4, False)])
+def test_a_limit_is_exceeded_by_no_more_than_rounding(excess, accepted, sign):
+    beyond = sign * (1.0 + excess)
+    size = 3.0
+    still = Script(points={"hinge": (Waypoint(0.0, size * beyond),)})
+    evenly = Script(points={"hinge": (Waypoint(0.0, 0.0), Waypoint(2.0, 2.0 * size * beyond))})
+    # from rest to rest by a cubic: the acceleration is largest at both ends, 6 d / T^2
+    smooth = Script(points={"hinge": (Waypoint(0.0, 0.0, 0.0), Waypoint(1.0, size * beyond / 6.0, 0.0))})
+    for limits, script in (
+        ({"lower": -size, "upper": size}, still),
+        ({"velocity": size}, evenly),
+        ({"acceleration": size}, smooth),
+    ):
+        joints = linkage(hinge(**limits))
+        if accepted:
+            sample(joints, script, np.array([0.0]))
+        else:
+            with pytest.raises(MotionLimitError, match="joint 'hinge'"):
+                sample(joints, script, np.array([0.0]))
 
 
 @pytest.mark.parametrize(

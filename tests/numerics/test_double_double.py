@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from replay.numerics.double_double import difference_of_products, triangle_area, two_product, two_sum
+from tests.amounts import cases
 
 
 def test_sums_and_products_are_exact():
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(cases(300)):
         a, b = (rng.normal(size=2) * 10 ** rng.uniform(-20, 20, 2)).tolist()
         for result, exact in (
             (two_sum(a, b), Fraction(a) + Fraction(b)),
@@ -20,7 +21,7 @@ def test_sums_and_products_are_exact():
 
 def test_the_sign_of_a_difference_of_products_survives_cancellation():
     rng = np.random.default_rng(2)
-    for _ in range(300):
+    for _ in range(cases(300)):
         a, b, c = rng.normal(size=3).tolist()
         d = a * b / c * (1.0 + rng.integers(-3, 4) * 2.0**-52)
         exact = Fraction(a) * Fraction(b) - Fraction(c) * Fraction(d)
@@ -32,7 +33,7 @@ def test_the_sign_of_a_difference_of_products_survives_cancellation():
 def test_the_area_of_a_sliver_has_all_its_digits():
     rng = np.random.default_rng(3)
     with mp.workdps(60):
-        for _ in range(200):
+        for _ in range(cases(200)):
             p = rng.uniform(-1, 1, (3, 3))
             p[2] = p[0] + rng.uniform() * (p[1] - p[0]) + 10 ** rng.uniform(-15, 0) * rng.normal(size=3)
             u, v = ([mp.mpf(float(x)) - mp.mpf(float(y)) for x, y in zip(p[k], p[0], strict=True)] for k in (1, 2))

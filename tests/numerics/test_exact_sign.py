@@ -6,6 +6,7 @@ import numpy as np
 
 from replay.numerics.double_double import two_sum
 from replay.numerics.exact_sign import sign_of_determinant, sign_of_difference
+from tests.amounts import cases
 
 
 def _sign(value: Fraction) -> int:
@@ -29,7 +30,7 @@ def _determinant(rows) -> Fraction:
 def test_differences_that_cancel_have_the_sign_of_rational_arithmetic():
     rng = np.random.default_rng(1)
     signs = []
-    for k in range(3000):
+    for k in range(cases(3000)):
         spread = (2, 40, 300, 1000)[k % 4]
         a, b = float(rng.normal() * 2.0 ** rng.integers(-spread, spread)), _pair(rng, spread)
         factor = 2.0 ** int(rng.integers(-3, 4))
@@ -47,7 +48,7 @@ def test_differences_that_cancel_have_the_sign_of_rational_arithmetic():
 def test_determinants_of_dependent_rows_are_zero_and_of_almost_dependent_ones_are_not():
     rng = np.random.default_rng(2)
     signs = []
-    for k in range(2000):
+    for k in range(cases(2000)):
         spread = (2, 30, 300, 700)[k % 4]
         rows = [
             [float(x) for x in rng.integers(-(2**20), 2**20, 3) * 2.0 ** rng.integers(-spread, spread)]
@@ -76,7 +77,7 @@ def test_determinants_of_dependent_rows_are_zero_and_of_almost_dependent_ones_ar
 
 def test_random_determinants_have_the_sign_of_rational_arithmetic():
     rng = np.random.default_rng(3)
-    for _ in range(500):
+    for _ in range(cases(500)):
         rows = [(_pair(rng, 60), _pair(rng, 60), float(rng.normal())) for _ in range(3)]
         assert sign_of_determinant(*rows) == _sign(_determinant(rows))
 

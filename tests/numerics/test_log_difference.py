@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from replay.numerics.log_difference import mean_inverse_linear
+from tests.amounts import cases
 from tests.numerics import references
 
 _TOLERANCE = 2e-14  # measured worst of 20 000 cases: 7e-15, next to the border of the series
@@ -28,7 +29,7 @@ def _values(family: str, rng: np.random.Generator) -> np.ndarray:
 @pytest.mark.parametrize("family", ["random", "close", "two equal", "scales", "one zero"])
 def test_it_is_the_second_divided_difference_of_z_ln_z(family):
     rng = np.random.default_rng(7)
-    for _ in range(100):
+    for _ in range(cases(100)):
         z = rng.permutation(_values(family, rng)).tolist()
         expected = references.mean_inverse_linear(*z)
         assert abs(float((mp.mpf(mean_inverse_linear(*z)) - expected) / expected)) <= _TOLERANCE, z

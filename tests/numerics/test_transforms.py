@@ -8,19 +8,20 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from replay.numerics import transforms
+from tests.amounts import cases
 
 ANGLES = st.one_of(st.floats(-7, 7), st.sampled_from([0.0, 1e-9, np.pi, -np.pi, np.pi - 1e-9, np.pi / 2]))
 EPS = 4e-15  # a dozen roundings of numbers near 1
 
 
 @given(arrays(float, 3, elements=ANGLES))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=cases(100), deadline=None)
 def test_rpy_matches_scipy(rpy):
     np.testing.assert_allclose(transforms.from_rpy(rpy)[:3, :3], Rotation.from_euler("xyz", rpy).as_matrix(), atol=EPS)
 
 
 @given(arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 1e-3))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=cases(200), deadline=None)
 def test_quaternion_round_trip_is_xyzw_with_w_not_negative(quat):
     unit = quat / np.linalg.norm(quat)
     back = transforms.to_quaternion(transforms.from_quaternion(quat))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.collision.columns import CollisionColumns
+from replay.collision.columns import CollisionColumns, Crossings
 from replay.numerics import transforms
 from replay.recording import provenance
 from replay.recording.scene_view import BodyView, SceneView, SensorView
@@ -77,18 +77,23 @@ def _block(rng: np.random.Generator, first: int, n: int, wild: bool) -> FrameBlo
     poses = transforms.from_rpy(rng.uniform(-3, 3, size=(n, len(LAYOUT.links), 3)))
     poses[..., :3, 3] = rng.normal(size=(n, len(LAYOUT.links), 3)) * 1e3
     status = rng.integers(0, 3, size=(n, d)).astype(np.uint8)
+    level = rng.integers(0, 3, size=(n, p)).astype(np.uint8)
+    time = ((first + np.arange(n, dtype=np.int64)) * 50_000_000_000) // 3
     return FrameBlock(
         layout=LAYOUT,
         first=first,
-        time=((first + np.arange(n, dtype=np.int64)) * 50_000_000_000) // 3,
+        time=time,
         joint_positions=numbers(n, 2),
         joint_velocities=numbers(n, 2),
         link_poses=poses,
         collision=CollisionColumns(
-            level=rng.integers(0, 3, size=(n, p)).astype(np.uint8),
+            level=level,
             clearance=numbers(n, p),
             evaluated=rng.random((n, p)) < 0.5,
             undecided=rng.random((n, p)) < 0.02,
+            between=rng.integers(0, 4, size=(n, p)).astype(np.uint8),
+            clearance_bound=numbers(n, p),
+            crossings=_crossings(np.random.default_rng([first, n]), first, time, level),
         ),
         readings={
             "distance": DistanceColumns(
@@ -111,6 +116,23 @@ def _block(rng: np.random.Generator, first: int, n: int, wild: bool) -> FrameBlo
             ),
         },
     )
+
+
+def _crossings(rng: np.random.Generator, first: int, time: np.ndarray, level: np.ndarray) -> Crossings:
+    """Return a bracket for each change of a level after the first frame, and for a few that frames do not show."""
+    rows = []
+    for threshold in (1, 2):
+        reached = level >= threshold
+        for frame, pair in np.argwhere(np.ones_like(reached[1:])).tolist():
+            was, is_ = bool(reached[frame, pair]), bool(reached[frame + 1, pair])
+            unseen = was == is_ and rng.random() < 0.1
+            moments = np.sort(rng.integers(time[frame], time[frame + 1], size=4, endpoint=True)).tolist()
+            changes = [not was] if was != is_ else [not was, was] if unseen else []
+            for k, begins in enumerate(changes):
+                rows.append((moments[2 * k + 1], pair, threshold, begins, moments[2 * k], first + frame + 1))
+    rows.sort(key=lambda row: row[:2])
+    latest, pair, threshold, begins, earliest, frame = np.array(rows, dtype=np.int64).reshape(-1, 6).T
+    return Crossings(pair, threshold.astype(np.uint8), begins > 0, earliest, latest, frame)
 
 
 def described(frames: int) -> provenance.Provenance:

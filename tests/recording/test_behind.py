@@ -47,6 +47,19 @@ def test_an_error_of_the_simulation_leaves_no_file(threaded: bool, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("threaded", [True, False])
+@pytest.mark.parametrize("blocks", [0, 1])
+def test_after_an_error_of_the_simulation_nothing_is_finished(threaded: bool, blocks: int) -> None:
+    log: list[str] = []
+    writers = [Noting(name, log, lambda: True) for name in "ab"]
+    with pytest.raises(ZeroDivisionError), WriteBehind(writers, threaded=threaded) as behind:
+        for block in itertools.islice(synthetic.blocks(FRAMES, wild=False), blocks):
+            behind.put(block)
+        raise ZeroDivisionError
+    assert not {"a finish", "b finish", "a commit", "b commit"} & set(log)
+    assert log[-2:] == ["a discard", "b discard"]
+
+
 class Failing:
     """A writer that fails at its third block."""
 

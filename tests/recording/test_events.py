@@ -17,11 +17,11 @@ from replay.logs.mcap_reader import McapLog
 from replay.logs.mcap_writer import McapFileWriter
 from replay.recording import messages
 from replay.recording.event_messages import encode, read_events
-from replay.recording.events import Events, Transition
+from replay.recording.events import SEVERITY, Events, Transition
 from replay.recording.reader import read
 from tests.recording.test_round_trip import write
 
-KINDS = ("bounds", "contact", "undecided", "detection", "too close", "saturation")
+KINDS = ("bounds", "contact", "undecided", "detection", "too close", "saturation", "unresolved")
 # The last ones end in bytes that look like the field of the frame, or like the words of an event.
 NAMES = ("arm/a|table/b", "left ä", "s5five", "5\x05\0\0\0", "5", "x begins: y", "")
 TRANSITIONS = st.builds(Transition, st.sampled_from(KINDS), st.booleans(), st.sampled_from(NAMES), st.text(max_size=3))
@@ -29,8 +29,8 @@ FRAMES = st.one_of(st.integers(0, 300), st.sampled_from([127, 128, 16383, 16384,
 TIMES = st.one_of(st.integers(0, 5 * 10**9), st.integers(0, 10**15))
 
 
-def log_message(time: int, frame: int, what: Transition) -> bytes:
-    """Return the message as the protobuf library writes it in one piece."""
+def log_message(time: int, frame: int, what: Transition, earliest: int | None = None) -> bytes:
+    """Return the message as the protobuf library writes it in one piece; format 1 has no `earliest`."""
     data: bytes = messages.message_class(messages.LOG)(
         timestamp={"seconds": time // 10**9, "nanos": time % 10**9},
         level=what.severity,
@@ -38,8 +38,19 @@ def log_message(time: int, frame: int, what: Transition) -> bytes:
         name=what.subject,
         file=what.source,
         line=frame,
+        earliest=earliest,
     ).SerializeToString(deterministic=True)
     return data
+
+
+def test_how_severe_each_beginning_is_and_that_an_end_is_information() -> None:
+    """In Foxglove's levels: 2 is information, 3 a warning, 4 an error."""
+    severe = {"bounds": 3, "contact": 4, "undecided": 3, "detection": 2, "too close": 3, "saturation": 3}
+    severe |= {"unresolved": 3}
+    assert severe == SEVERITY and set(severe) == set(KINDS)
+    for kind, level in severe.items():
+        assert Transition(kind, True, "x", "/y").severity == level
+        assert Transition(kind, False, "x", "/y").severity == 2
 
 
 def log_file(path: Path, times: list[int], payloads: list[bytes]) -> Path:
@@ -53,21 +64,34 @@ def log_file(path: Path, times: list[int], payloads: list[bytes]) -> Path:
     return path
 
 
-@given(rows=st.lists(st.tuples(TIMES, FRAMES, TRANSITIONS), max_size=12))
+@given(rows=st.lists(st.tuples(TIMES, FRAMES, TRANSITIONS), max_size=12), dated=st.booleans())
 def test_messages_are_those_of_the_protobuf_library_and_come_back(
-    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[int, int, Transition]]
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[int, int, Transition]], dated: bool
 ) -> None:
     table = tuple(dict.fromkeys(what for _, _, what in rows))
     columns = [np.array([row[k] for row in rows], dtype=np.int64) for k in (0, 1)]
-    events = Events(columns[0], columns[1], np.array([table.index(w) for _, _, w in rows], dtype=np.int64), table)
+    earliest = columns[0] // 3 if dated or not rows else None
+    codes = np.array([table.index(what) for _, _, what in rows], dtype=np.int64)
+    events = Events(columns[0], columns[1], codes, table, earliest)
     encoded = encode(events)
-    assert encoded == [log_message(*row) for row in rows]
+    assert encoded == [log_message(*row, row[0] // 3 if dated else None) for row in rows]
     with McapLog(log_file(tmp_path_factory.mktemp("e") / "e.mcap", columns[0].tolist(), encoded)) as log:
         found = read_events(log)
     assert found == events and list(found) == list(events)
-    assert [(e.time, e.frame, e.kind, e.begins, e.subject, e.source) for e in found] == [
-        (time, frame, what.kind, what.begins, what.subject, what.source) for time, frame, what in rows
+    assert [(e.time, e.frame, e.kind, e.begins, e.subject, e.source, e.earliest) for e in found] == [
+        (time, frame, what.kind, what.begins, what.subject, what.source, time // 3 if dated else None)
+        for time, frame, what in rows
     ]
+
+
+def test_a_time_that_only_some_messages_have_is_damage(tmp_path: Path) -> None:
+    what = Transition("contact", True, "a|b", "/collision")
+    payloads = [log_message(1, 1, what, 0), log_message(2, 2, what)]
+    with (
+        McapLog(log_file(tmp_path / "e.mcap", [1, 2], payloads)) as log,
+        pytest.raises(RecordingError, match="/events"),
+    ):
+        read_events(log)
 
 
 def test_messages_put_together_otherwise_mean_what_protobuf_says(tmp_path: Path) -> None:
@@ -109,6 +133,21 @@ def test_events_are_equal_by_what_they_mean() -> None:
     assert one != shifted and one.count_missing_in(shifted) == 4
     assert one.count_missing_in(one[:3]) == 1 and one[:3].count_missing_in(one) == 0
     assert Events.none() == one[:0] and one != list(one)
+    dated = dataclasses.replace(one, earliest=time)
+    assert dated != one and dated == dataclasses.replace(one, earliest=time) and dated[1:2][0].earliest == 1
+
+
+def test_frames_do_not_show_what_lies_between_them() -> None:
+    a, b = Transition("contact", True, "p", "/collision"), Transition("contact", False, "p", "/collision")
+    other = Transition("contact", True, "q", "/collision")
+    frame = np.array([1, 1, 3, 3, 3, 3, 4])  # begins and ends before 1; begins, ends and begins before 3; ends before 4
+    events = Events(10 * frame, frame, np.array([0, 1, 0, 2, 1, 0, 1]), (a, b, other), 10 * frame - 1)
+    assert [(e.frame, e.begins, e.subject) for e in events.at_frames()] == [
+        (3, True, "q"),
+        (3, True, "p"),
+        (4, False, "p"),
+    ]
+    assert Events.none().at_frames() == Events.none()
 
 
 @pytest.fixture(scope="module")

@@ -48,6 +48,17 @@ def test_every_topic_is_a_table_with_units(recording: Recording) -> None:
         assert lengths == {len(recording.events) if topic == "/events" else FRAMES}
 
 
+def test_what_is_detected_is_named_and_nothing_is_an_empty_text(recording: Recording) -> None:
+    table, columns = tables(recording)["/distance/left"], recording.distance
+    names = dict(enumerate(recording.layout.shapes)) | {-1: ""}
+    assert set(columns.shape[:, 0].tolist()) == set(names)
+    assert table["shape"].tolist() == [names[k] for k in columns.shape[:, 0].tolist()]
+    words = ("nothing", "detected", "too_close")
+    assert table["status"].tolist() == [words[k] for k in columns.status[:, 0].tolist()]
+    levels = tables(recording)["/collision"]["arm/beam|patient/body level"]
+    assert levels.tolist() == [("clear", "bounds", "contact")[k] for k in recording.collision.level[:, 0].tolist()]
+
+
 def test_csv_reads_back(recording: Recording, tmp_path: Path) -> None:
     paths = export(recording, tmp_path, format="csv")
     assert len(paths) == 7 and len({path.name for path in paths}) == 7

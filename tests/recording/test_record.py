@@ -16,6 +16,7 @@ from replay.recording.provenance import code_identity, sha256
 from replay.recording.reader import read
 from replay.recording.record import record_blocks
 from replay.recording.scene_view import view
+from replay.recording.writer import McapWriter
 from replay.scenario.load import load, load_sources
 from replay.scenario.scene import Scene, build
 from replay.simulation import BLOCK_FRAMES, FrameBlock
@@ -110,6 +111,21 @@ def test_an_error_keeps_the_recordings_of_before(scene: Scene, tmp_path: Path) -
         record_blocks(scene, failing(), tmp_path, overwrite=True)
     assert paths.mcap.read_bytes() == before
     assert not list(tmp_path.glob("*.part"))
+
+
+def test_the_log_of_record_is_the_last_to_get_its_name(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there: list[bool] = []
+
+    class Looking(McapWriter):
+        def commit(self) -> None:
+            there.append((tmp_path / "two_boxes.rrd").is_file())
+            super().commit()
+
+    monkeypatch.setattr("replay.recording.record.McapWriter", Looking)
+    record_blocks(scene, blocks(scene), tmp_path)
+    assert there == [True]
 
 
 def test_a_rerun_recording_of_another_run_is_not_left_beside_the_log(scene: Scene, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,10 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def logged(path: Path) -> dict[tuple[str, str], Rows]:
+    return logged_in(path)
+
+
+def logged_in(path: Path) -> dict[tuple[str, str], Rows]:
     """Return, for each entity and component, its values by frame; what does not change is at frame -1."""
     result: dict[tuple[str, str], Rows] = {}
     for chunk in RrdReader(str(path)).stream():
@@ -113,6 +118,30 @@ def test_curves_have_a_gap_where_there_is_no_value(logged: dict[tuple[str, str],
     texts = [row[0] for row in logged["/events", "text"].values()]  # type: ignore[index]
     assert any("contact begins: head/housing|table/body" in text for text in texts)
     assert "name: moving" in logged["/scenario", "text"][-1][0]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("present", "gaps"),
+    [(range(250, 256), [256]), (range(256, 260), [260]), (range(200, 300), []), ([255, 257], [256, 258])],
+)
+def test_a_gap_may_begin_where_a_block_ends(tmp_path: Path, present: Sequence[int], gaps: list[int]) -> None:
+    writer = RerunWriter(tmp_path / "gap.rrd", moving.LAYOUT, moving.scene())
+    for block in moving.blocks(FRAMES):
+        frames = block.first + np.arange(len(block.time))
+        evaluated = np.stack([np.isin(frames, list(present)), np.zeros(len(frames), dtype=bool)], axis=1)
+        clearance = np.where(evaluated, 0.25, np.nan)
+        writer.write(
+            dataclasses.replace(
+                block, collision=dataclasses.replace(block.collision, evaluated=evaluated, clearance=clearance)
+            )
+        )
+    writer.commit()
+    curves = {
+        name: rows for (name, component), rows in logged_in(tmp_path / "gap.rrd").items() if component == "scalars"
+    }
+    (curve,) = (rows for name, rows in curves.items() if name.startswith("/clearance/"))
+    expected = {**dict.fromkeys(present, 0.25), **dict.fromkeys(gaps, None)}
+    assert {k: None if np.isnan(row[0]) else row[0] for k, row in curve.items()} == expected  # type: ignore[index]
 
 
 def test_an_existing_recording_stays(path: Path) -> None:

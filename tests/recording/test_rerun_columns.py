@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from replay.recording import blueprint
-from replay.recording.blueprint_parts import RecordingBlueprint
+from replay.recording.blueprint_parts import recording_blueprint
 from replay.recording.rerun_columns import Column, Lengths, column, constants, index_of, packed, row
 from replay.recording.rerun_file import RerunFile
 
@@ -101,7 +101,7 @@ def test_a_blueprint_made_of_parts_is_the_librarys(charts: tuple[str, ...], tmp_
         end = 1_000_000_000 * (k + 2)
         eye = blueprint.eye_of(corners)
         described = blueprint.recording(charts, eye, blueprint.axis_until(end))
-        mine = contents(tmp_path / "mine.rrd", RecordingBlueprint(charts, corners, end))
+        mine = contents(tmp_path / "mine.rrd", recording_blueprint(charts, corners, end))
         assert mine == contents(tmp_path / "theirs.rrd", described)
         assert len(mine) > 15
         found.append(mine)

@@ -44,7 +44,7 @@ def assert_same(recording: Recording, blocks: list[FrameBlock]) -> None:
     for group in (None, "collision", "distance", "capacitive"):
         fields = ("time", "joint_positions", "joint_velocities")
         if group:
-            fields = tuple(getattr(recording, group).__dataclass_fields__)
+            fields = tuple(field.name for field in getattr(recording, group).fields())
         for field in fields:
             parts = [getattr(getattr(block, group) if group else block, field) for block in blocks]
             expected = np.concatenate(parts)[:frames]
@@ -82,11 +82,20 @@ def test_events_are_the_changes_of_the_columns(path: Path) -> None:
         replayed = np.zeros_like(expected)
         for event in recording.events:
             if event.kind == kind:
-                assert event.time == recording.time[event.frame]
+                before = recording.time[max(event.frame - 1, 0)]
+                assert before <= event.earliest <= event.time <= recording.time[event.frame]
+                if kind not in ("bounds", "contact"):
+                    assert (event.earliest, event.time) == (before, recording.time[event.frame])
                 column = names.index(event.subject)
                 assert replayed[event.frame, column] != event.begins, "an event must change something"
                 replayed[event.frame :, column] = event.begins
         assert np.array_equal(replayed, expected), kind
+    moments = [(event.kind, event.subject, event.begins, event.earliest, event.time) for event in recording.events]
+    for block in synthetic.blocks(FRAMES):
+        found = block.collision.crossings
+        for k in range(len(found.pair)):
+            kind, subject = ("bounds", "contact")[found.level[k] - 1], recording.layout.pairs[found.pair[k]]
+            assert (kind, subject, bool(found.begins[k]), found.earliest[k], found.latest[k]) in moments
     assert [event.frame for event in recording.events] == sorted(event.frame for event in recording.events)
 
 
@@ -198,6 +207,6 @@ def test_what_may_not_be_written_is_refused(path: Path, tmp_path: Path) -> None:
 
 
 def test_a_recording_of_another_format_says_so(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(provenance, "READABLE_FORMATS", (2, 3))
-    with pytest.raises(RecordingError, match="format 1; this version of replay reads 2 and 3"):
+    monkeypatch.setattr(provenance, "READABLE_FORMATS", (3, 4))
+    with pytest.raises(RecordingError, match="format 2; this version of replay reads 3 and 4"):
         read(path)

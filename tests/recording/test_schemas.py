@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from foxglove_schemas_protobuf import Log_pb2
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from grpc_tools import protoc
 
@@ -33,11 +34,18 @@ def test_every_file_is_a_type() -> None:
     assert sorted(f"replay.{path.stem}" for path in SCHEMAS.glob("*.proto")) == sorted(OWN)
 
 
-def test_field_numbers_stay_what_they_were_in_format_1() -> None:
+def test_field_numbers_stay_for_ever() -> None:
     files = [file for name in OWN for file in made(name).file]
     numbers = {m.name: {f.name: f.number for f in m.field} for file in files for m in file.message_type}
     assert numbers == {
-        "CollisionStates": {"level": 1, "clearance": 2, "evaluated": 3, "undecided": 4},
+        "CollisionStates": {
+            "level": 1,
+            "clearance": 2,
+            "evaluated": 3,
+            "undecided": 4,
+            "between": 5,
+            "clearance_bound": 6,
+        },
         "DistanceReading": {
             "status": 1,
             "distance": 2,
@@ -60,3 +68,14 @@ def test_field_numbers_stay_what_they_were_in_format_1() -> None:
             "unresolved": 9,
         },
     }
+
+
+def test_a_log_is_foxgloves_with_one_field_behind_all_of_its_own() -> None:
+    theirs, ours = Log_pb2.Log.DESCRIPTOR, messages.message_class(messages.LOG).DESCRIPTOR
+    assert ours.full_name == theirs.full_name
+    assert [(f.name, f.number, f.type) for f in ours.fields[:-1]] == [(f.name, f.number, f.type) for f in theirs.fields]
+    assert (ours.fields[-1].name, ours.fields[-1].number) == ("earliest", 1000)
+    read_by_theirs = Log_pb2.Log.FromString(
+        messages.message_class(messages.LOG)(line=7, earliest=5).SerializeToString()
+    )
+    assert read_by_theirs.line == 7

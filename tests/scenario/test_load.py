@@ -144,6 +144,7 @@ def test_models_come_by_name_or_from_a_file(tmp_path):
         "collision.bounds": "obb_vertices@1",
         "collision.narrowphase": "gjk@1",
         "collision.pieces": "convex@1",
+        "collision.between": "sampled@1",
         "collision.clearance": "never",
         "distance": "thesis@2",
         "capacitive": "midpoint@3",
@@ -179,7 +180,7 @@ def test_every_choice_of_method_has_a_revision():
     methods = Model.model_fields
     assert set(methods) == {"collision", "distance", "capacitive"}
     expected = set()
-    for option in ("bounds", "narrowphase", "pieces"):
+    for option in ("bounds", "narrowphase", "pieces", "between"):
         field = methods["collision"].annotation.model_fields[option]
         expected |= {f"collision.{option}.{choice}" for choice in field.annotation.__args__}
     for group in ("distance", "capacitive"):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from replay.language.node import Node
 from replay.scenario.yaml_text import MAX_DEPTH, MAX_NODES, parse
+from tests.amounts import cases
 
 
 def read(text):
@@ -135,7 +136,7 @@ EDITS = st.lists(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=cases(300))
 @given(EDITS)
 def test_damaged_text_is_a_tree_or_a_problem_and_never_a_crash(edits):
     text = bytearray(SEED)

@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
+import pytest
+
 import replay
 from replay.batch.baseline import Baseline
 from replay.batch.select import load_all
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
+
+pytestmark = pytest.mark.compiled  # phantoms of thousands of triangles
 
 ROOT = Path(replay.__file__).parents[1]
 BASELINES = ROOT / "tests" / "baselines"

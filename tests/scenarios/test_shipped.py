@@ -22,6 +22,8 @@ from replay.batch.select import find_scenarios
 from replay.collision.columns import Level
 from replay.sensing.distance.columns import Detection
 
+pytestmark = pytest.mark.compiled  # phantoms of thousands of triangles
+
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAMES = ("carm_bodyguard", "carm_clear", "carm_head_contact", "carm_near", "carm_parking", "doctor_walks_in")
 FILES = sorted(SCENARIOS.rglob("*.yaml"))

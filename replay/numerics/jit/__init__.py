@@ -1,7 +1,8 @@
 """Compiled kernels: the one policy, what each is made of, where they are kept, and how they are made ready at once.
 
 `policy` has the decorators, `entries` the kernels that scenarios call (with the types they take), `reach` what a kernel
-is made of and so its key, `store` the files, `compiler` all that reaches into numba, `progress` what the user is told.
+is made of and so its key, `store` the files, `compiler` and `linking` all that reaches into numba, `progress` what the
+user is told.
 """
 
 from __future__ import annotations

@@ -12,8 +12,9 @@ among arguments do not make specialisations; the types of operators on numbers a
 sets compare without rebuilding their defaults.
 
 None of this is public in numba, so it holds for the versions it was tried with, `TRIED`. With another version, or when
-a name that it needs is gone, `AVAILABLE` is false and kernels are compiled by numba's public decorator, only slower.
-When a version is added: run the tests, `replay bench start` and `replay bench --quick` with it.
+a name that it needs is gone, `AVAILABLE` is false and kernels are compiled by numba's public decorator: the same
+numbers, only slower, which is said. What else is not public stands below, `UNCOUNTED` and what follows it, and is left
+out where numba has it no more. When a version is added: run the tests, `replay bench start` and `replay bench --quick`.
 """
 
 from __future__ import annotations
@@ -21,16 +22,17 @@ from __future__ import annotations
 import contextlib
 import gc
 import operator
+import os
 import pickle
 from collections.abc import Iterator
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
-from numba import types
+from numba import config, types
 from numba.core import event
 
 from replay.numerics.jit import progress, store
+from replay.numerics.jit.linking import NEEDED, KernelLibrary
 from replay.numerics.jit.reach import key_of, name_of, reached
 
 TRIED = ("0.68.",)
@@ -39,16 +41,13 @@ TRIED = ("0.68.",)
 _NEEDED: tuple[tuple[Any, tuple[str, ...]], ...] = ()
 try:
     from numba.core import serialize, sigutils, typing
-    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
     from numba.core.compiler import CompileResult
     from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.environment import lookup_environment
+    from numba.core.options import DefaultOptions
     from numba.core.registry import CPUDispatcher, cpu_target
     from numba.core.targetconfig import TargetConfig
 
     _NEEDED = (
-        (JITCodeLibrary, ("_unserialize", "_finalize_final_module", "_finalize_dynamic_globals", "add_llvm_module")),
-        (JITCPUCodegen, ("set_env", "_module_pass_manager", "_library_class")),
         (CPUDispatcher, ("compile", "add_overload", "get_call_template", "get_overload")),
         (CompileResult, ("_reduce", "_rebuild", "_replace")),
         (TargetConfig, ("__hash__", "__eq__", "options")),
@@ -58,95 +57,60 @@ try:
     )
 except ImportError:  # another numba: see the module's text
     CPUDispatcher: Any = object  # type: ignore[no-redef]
-    JITCodeLibrary: Any = object  # type: ignore[no-redef]
+    DefaultOptions: Any = object  # type: ignore[no-redef]
 
 AVAILABLE = (
     numba.__version__.startswith(TRIED)
-    and bool(_NEEDED)
-    and all(hasattr(place, name) for place, names in _NEEDED for name in names)
+    and bool(_NEEDED and NEEDED)
+    and all(hasattr(place, name) for place, names in (*_NEEDED, *NEEDED) for name in names)
 )
 """Whether this numba is one whose inner side is known."""
 
 
+UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+"""The option of compiling without reference counting."""
+
+if hasattr(config, "_config_fname"):
+    # numba takes settings from a .numba_config.yaml too, if one lies in the folder that a command is called in; what a
+    # kernel computes, and whether it is compiled, is none of that folder's business
+    _settings: Any = config
+    _settings._config_fname = os.devnull
+    _settings.reload_config()
+
+
+class _Forgiving:
+    """numba's own cache of a function: what cannot be read in it is compiled again, what cannot be written not kept."""
+
+    def __init__(self, cache: Any) -> None:
+        self._cache = cache
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return self._cache.load_overload(sig, target_context)
+        except Exception:  # whatever unpickling half a file raises
+            with contextlib.suppress(OSError):
+                self._cache.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            self._cache.save_overload(sig, data)
+        except Exception as error:
+            progress.unkept(str(error))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
+
+
+def forgiving(dispatcher: Any) -> Any:
+    """Return what numba's public decorator made, with a cache that is no reason to fail."""
+    if hasattr(dispatcher, "_cache"):
+        dispatcher._cache = _Forgiving(dispatcher._cache)
+    return dispatcher
+
+
 _NUMBERS = (types.Float, types.Integer, types.Boolean) if AVAILABLE else ()
 _known_operators: dict[Any, tuple[Any, Any]] = {}
-
-
-class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """The LLVM code of one function; what it calls is in the libraries it links, until `emit` puts all into one."""
-
-    _emitted = False
-    _shared_module: Any
-
-    def add_llvm_module(self, module: Any) -> None:
-        """Take in code as it is."""
-        module.data_layout = self._codegen._data_layout
-        self._final_module.link_in(module)
-
-    def finalize(self) -> None:
-        """Take nothing in any more; nothing is optimised yet."""
-        self._raise_if_finalized()
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """Return a function's address, 0 if it has none."""
-        address: int = super().get_pointer_to_function(name) if self._emitted else 0
-        return address
-
-    def emit(self) -> None:
-        """Link all that is reached, optimise it, and make machine code.
-
-        Optimised twice, at first without vectors: what is small by then is inlined, and its loops become vectors (with
-        one pass, a cone's walk of the tree and a ray's took twice as long; the other costs a fifth of the passes).
-        """
-        self._link_reached(self._final_module)
-        for options in ({"loop_vectorize": False}, {}):
-            manager, builder = self._codegen._module_pass_manager(**options)
-            manager.run(self._final_module, builder)
-        self._final_module.verify()
-        self._finalize_final_module()
-        self._emitted = True
-        for variable in self._final_module.global_variables:
-            environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
-            if environment is not None and not variable.is_declaration:
-                JITCPUCodegen.set_env(self._codegen, variable.name, environment)
-
-    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
-        """Return machine code and, in place of code for other functions to take in, the names of what it defines."""
-        names = (f'define void @"{function.name}"() {{ ret void }}' for function in self.get_defined_functions())
-        return self.name, "object", (self._get_compiled_object(), llvm.parse_assembly("\n".join(names)).as_bitcode())
-
-    def _link_reached(self, module: Any) -> None:
-        """Put the code of all that is reached into a module, each function once."""
-        found = set()
-        waiting = list(self._linking_libraries)
-        while waiting:
-            library = waiting.pop()
-            if library in found:
-                continue
-            found.add(library)
-            if isinstance(library, KernelLibrary):
-                waiting.extend(library._linking_libraries)
-                module.link_in(library._for_callers(), preserve=True)
-            else:
-                module.link_in(library._get_module_for_linking(), preserve=True)
-
-    def _for_callers(self) -> Any:
-        """Return the function's own code, in a form that may stand in several modules."""
-        self._ensure_finalized()
-        for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.external:
-                function.linkage = "linkonce_odr"
-        return self._final_module
-
-    def _get_module_for_linking(self) -> Any:
-        """Return the code with all that it reaches: what a function that is no kernel takes in."""
-        if self._shared_module is None:
-            module = self._for_callers().clone()
-            self._link_reached(module)
-            self._shared_module = module
-        return self._shared_module
 
 
 class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]

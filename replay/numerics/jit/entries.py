@@ -12,10 +12,12 @@ from functools import cached_property
 from types import ModuleType
 from typing import Any, TypeVar
 
+import numba
 from numba import types
 
 from replay.numerics.jit import compiler, progress, store
 from replay.numerics.jit.reach import key_of, name_of, reached
+from replay.numerics.remarks import remark
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -80,6 +82,8 @@ def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: 
         share: called when more than one is not compiled yet, so that other processes can be asked to do the same; not
             where numba keeps kernels itself (`compiler.AVAILABLE`), since nobody knows what it has.
     """
+    if not compiler.AVAILABLE:
+        remark(f"numba {numba.__version__} is not known from within ({compiler.TRIED[0]}x is): kernels compile slower")
     entries = [_Entry(kernel) for kernel in dict.fromkeys(kernels) if hasattr(kernel, "compile")]
     missing = [entry for entry in entries if compiler.AVAILABLE and not entry.is_ready]
     if missing:

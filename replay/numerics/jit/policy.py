@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import config
+from numba import config
 
-from replay.numerics.jit import compiler, progress, store
+from replay.numerics.jit import compiler, store
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -22,11 +20,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "forceinline": False}
 
 _settings: Any = config  # numba fills this module at run time
-if hasattr(_settings, "_config_fname"):
-    # numba takes settings from a .numba_config.yaml too, if one lies in the folder that a command is called in; what a
-    # kernel computes, and whether it is compiled, is none of that folder's business
-    _settings._config_fname = os.devnull
-    _settings.reload_config()
 
 
 def kernel(function: Function) -> Function:
@@ -48,7 +41,7 @@ def leaf_kernel(function: Function) -> Function:
     array: the caller would give back a reference that nobody took. The results are the same. numba has no public option
     for this: should its internal one disappear, the function is compiled as usual.
     """
-    return cast(Function, _compiled(function, {"_nrt": False} if _counting_is_optional() else {}))
+    return cast(Function, _compiled(function, compiler.UNCOUNTED))
 
 
 def inlined_kernel(function: Function) -> Function:
@@ -57,7 +50,7 @@ def inlined_kernel(function: Function) -> Function:
     A call passes each field of each array by itself: for two bodies of GJK that is 200 words, 35 of the 70 ns of a
     query that needs one step. The results are the same.
     """
-    options = {"forceinline": True, **({"_nrt": False} if _counting_is_optional() else {})}
+    options = {"forceinline": True, **compiler.UNCOUNTED}
     return cast(Function, _compiled(function, options))
 
 
@@ -68,42 +61,12 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         wanted = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return compiler.KernelDispatcher(function, targetoptions={**wanted, **_OPTIONS, **options})
     folder, previous = _numbas_own_cache(), _settings.CACHE_DIR
-    dispatcher = numba.njit(**_OPTIONS)(function)
     if folder is not None:
         _settings.CACHE_DIR = str(folder)
-        try:
-            dispatcher.enable_caching()
-        finally:
-            _settings.CACHE_DIR = previous
-        dispatcher._cache = _Lenient(dispatcher._cache)
-    dispatcher.targetoptions.update(options)
-    return dispatcher
-
-
-class _Lenient:
-    """numba's own cache of a function; what cannot be read in it is removed, and what cannot be written is not kept."""
-
-    def __init__(self, cache: Any) -> None:
-        self._cache = cache
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what is kept, or None."""
-        try:
-            return self._cache.load_overload(sig, target_context)
-        except Exception:  # whatever unpickling half a file raises
-            with contextlib.suppress(OSError):
-                self._cache.flush()
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function."""
-        try:
-            self._cache.save_overload(sig, data)
-        except Exception as error:
-            progress.unkept(str(error))
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._cache, name)
+    try:
+        return compiler.forgiving(numba.njit(cache=folder is not None, **{**_OPTIONS, **options})(function))
+    finally:
+        _settings.CACHE_DIR = previous
 
 
 @lru_cache(maxsize=1)
@@ -117,13 +80,3 @@ def _numbas_own_cache() -> Path | None:
     for source in sorted(package.rglob("*.py")):
         digest.update(source.relative_to(package).as_posix().encode() + b"\0" + source.read_bytes())
     return folder / f"plain-{digest.hexdigest()[:20]}"
-
-
-@lru_cache(maxsize=1)
-def _counting_is_optional() -> bool:
-    """Return whether this numba knows the option of compiling without reference counting."""
-    try:
-        from numba.core.options import DefaultOptions
-    except ImportError:
-        return False
-    return hasattr(DefaultOptions, "_nrt")

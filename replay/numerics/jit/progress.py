@@ -15,6 +15,7 @@ from functools import lru_cache
 from numba.core import event
 
 from replay.numerics.compiling import Compiling
+from replay.numerics.remarks import remark
 
 _PATIENCE = 1.5  # seconds without a word; a single small kernel takes less
 _PAUSE = 0.25  # seconds between two looks on a terminal
@@ -102,15 +103,7 @@ class OnStderr:
                 print(f"replay: {state}", file=sys.stderr, flush=True)
 
 
-_said: set[str] = set()
 _unkept = threading.Event()
-
-
-def _print_remark(text: str) -> None:
-    print(f"replay: {text}", file=sys.stderr, flush=True)
-
-
-_remark: Callable[[str], None] = _print_remark
 
 
 @lru_cache(maxsize=1)
@@ -121,17 +114,9 @@ def counted() -> Progress:
     return progress
 
 
-def tell_by(tell: Callable[[Compiling], None], remark: Callable[[str], None]) -> None:
+def tell_by(tell: Callable[[Compiling], None]) -> None:
     """Let others tell it instead, as in a process whose stderr nobody reads."""
-    global _remark
-    counted().tell, _remark = tell, remark
-
-
-def remark(text: str) -> None:
-    """Say something about kernels, once a process."""
-    if text not in _said:
-        _said.add(text)
-        _remark(text)
+    counted().tell = tell
 
 
 def unkept(reason: str) -> None:

@@ -21,6 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from replay.numerics.jit import progress
+from replay.numerics.remarks import remark
 
 try:
     import fcntl
@@ -55,7 +56,7 @@ def directory() -> Path | None:
         if others is None:
             return base.resolve()
         reason = f"{base}: {others}"
-        progress.remark(f"compiled kernels are not kept in {reason}")
+        remark(f"compiled kernels are not kept in {reason}")
     progress.unkept(reason)
     return None
 

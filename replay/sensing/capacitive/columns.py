@@ -39,6 +39,6 @@ class CapacitiveColumns(Columns):
     saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
     touching: Annotated[Flags, Field(begins=("touch",))]
     per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]
-    increase: Annotated[Floats | None, Field(unit="F", gate="saturated")] = None
-    error: Annotated[Floats | None, Field(unit="F", gate="unresolved")] = None
-    unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3})] = None
+    increase: Annotated[Floats | None, Field(unit="F", gate="saturated", since=2)] = None
+    error: Annotated[Floats | None, Field(unit="F", gate="unresolved", since=2)] = None
+    unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3}, since=2)] = None

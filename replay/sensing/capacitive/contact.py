@@ -1,4 +1,6 @@
-"""Whether a triangle meets the plate, and whether its integral is infinite: decided by signs, before integrating.
+"""Touching and saturation: what the plate has in common with a triangle, and whether it is inside a body.
+
+Whether a triangle meets the plate, and whether its integral is infinite, is decided by signs, before integrating.
 
 Let T' be the triangle (side both) or the closure of its part with z > 0 (side front). The integral of 1/dist over T'
 is infinite if and only if T' has positive area and meets the closed rectangle in more than one point (METHODS 4).
@@ -13,24 +15,43 @@ b to c, comes down to z = 0 (from above, or from 0 on the way below), and q wher
 
 whose zero says that the triangle's plane holds the plate's corner u = v = z = 0. Coordinates are exact as given and
 all signs are exact, so a contact at a single point is told from one along a segment.
+
+Whether a plate is inside a body, or lies flush on one and faces into it, is asked of plates that no triangle saturates.
+Then, just before the plate, the body's surface is met at single points at most, so all of that layer is inside the body
+or none of it. If only faces count that face the plate's centre, and it is outside, others are too: on the way in from
+there is a face that faces it. So three points about the centre tell; not the centre itself, which the tip of a body may
+touch, or which a wall that does not face it may go through. They lie before the plate by more than what rounding takes
+for touching it, so a body that the plate's back lies flush on does not hold them, and one that its front lies flush on
+does.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numba import float64
 from numpy.typing import NDArray
 
+from replay.geometry.containment import inside
+from replay.geometry.tree import TREE_TYPE, Tree
 from replay.numerics.double_double import Pair, two_sum
 from replay.numerics.exact_sign import has_area, sign_of_determinant, sign_of_difference
-from replay.numerics.jit import kernel
+from replay.numerics.jit import entry, inlined_kernel, kernel
+from replay.sensing.capacitive.placed_plate import Triple
 
 CLEAR = 0
 TOUCHING = 1
 SATURATED = 2  # and touching
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Borders = tuple[Pair, Pair, Pair, Pair]
 Signs = tuple[int, int, int, int]
+
+_POINTS = 1e-3 * np.array([[0.37, 0.21], [-0.29, 0.31], [0.05, -0.43]])
+"""About the plate's centre, in its half sizes."""
+
+_BEFORE = 16.0
+"""How far before the plate, in what rounding takes for touching."""
 
 
 @kernel
@@ -73,17 +94,17 @@ def _segment_meets(p: Signs, q: Signs, a: Borders, b: Borders, c: Borders, z_a: 
     (p_k > 0) comes before every exit (q_k > 0). Of opposite borders the entry always comes first.
     """
     result = 2
-    for entry in range(4):
-        if p[entry] > 0 and q[entry] > 0:
+    for enter in range(4):
+        if p[enter] > 0 and q[enter] > 0:
             return 0
-        if (p[entry] > 0 and q[entry] == 0) or (p[entry] == 0 and q[entry] > 0):
+        if (p[enter] > 0 and q[enter] == 0) or (p[enter] == 0 and q[enter] > 0):
             result = 1
-        if p[entry] <= 0:
+        if p[enter] <= 0:
             continue
         for leave in range(4):
-            if q[leave] <= 0 or leave // 2 == entry // 2:
+            if q[leave] <= 0 or leave // 2 == enter // 2:
                 continue
-            order = sign_of_determinant((a[entry], a[leave], z_a), (b[entry], b[leave], z_b), (c[entry], c[leave], z_c))
+            order = sign_of_determinant((a[enter], a[leave], z_a), (b[enter], b[leave], z_b), (c[enter], c[leave], z_c))
             if order > 0:
                 return 0
             if order == 0:
@@ -157,3 +178,47 @@ def _plane_cut_meets(z_a: float, z_b: float, z_c: float, a: Borders, b: Borders,
         elif z_k < 0.0 < z_next:
             up = _crossing_signs(z_next, q, z_k, p)
     return _segment_meets(down, up, a, b, c, z_a, z_b, z_c)
+
+
+@inlined_kernel
+def may_touch(a: Triple, b: Triple, c: Triple, half_x: float, half_y: float) -> bool:
+    """Return False only if `contact` finds a triangle in the plate's frame CLEAR, by the first of its tests."""
+    return (
+        min(a[2], b[2], c[2]) <= 0.0 <= max(a[2], b[2], c[2])
+        and min(a[0], b[0], c[0]) <= half_x
+        and max(a[0], b[0], c[0]) >= -half_x
+        and min(a[1], b[1], c[1]) <= half_y
+        and max(a[1], b[1], c[1]) >= -half_y
+    )
+
+
+@entry(float64[:, :, ::1], TREE_TYPE, float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], float64[::1])
+@kernel
+def plates_inside(
+    triangles: Floats, tree: Tree, closing: Floats, T_plate_body: Floats, half_sizes: Floats, rounding: Floats
+) -> Flags:
+    """Return which plates (n, p) are inside a body that has an inside.
+
+    Args:
+        triangles, tree, closing: of the body, in its link's frame.
+        T_plate_body: (n, p, 4, 4) poses of the link.
+        half_sizes: (p, 2) [m].
+        rounding: (n,) [m], corners no farther than this from a plate's plane are on it.
+    """
+    n, plates = T_plate_body.shape[0], T_plate_body.shape[1]
+    found = np.empty((n, plates), np.bool_)
+    point = np.empty(3)
+    for frame in range(n):
+        for plate in range(plates):
+            T = T_plate_body[frame, plate]
+            held = False
+            for k in range(len(_POINTS)):
+                x = half_sizes[plate, 0] * _POINTS[k, 0] - T[0, 3]
+                y = half_sizes[plate, 1] * _POINTS[k, 1] - T[1, 3]
+                z = _BEFORE * rounding[frame] - T[2, 3]
+                for axis in range(3):
+                    point[axis] = T[0, axis] * x + T[1, axis] * y + T[2, axis] * z
+                if not held and inside(point, triangles, tree, closing) == 1:
+                    held = True
+            found[frame, plate] = held
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from replay.sensing.capacitive import tree_sum
+from replay.sensing.capacitive.tree import tree_sum
 
 
 @dataclass

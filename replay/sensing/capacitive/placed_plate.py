@@ -85,24 +85,23 @@ def _on_border(x: float, half: float, rounding: float) -> float:
 
 
 @inlined_kernel
-def _place_exactly(T: Floats, rounding: float, halves: tuple[float, float], x: float, y: float, z: float) -> Triple:
+def _place_exactly(plate: PlacedPlate, x: float, y: float, z: float) -> Triple:
     """Return a corner in the plate's frame; one that is on z = 0 or in a border's plane to rounding is in it."""
-    corner = place_corner(T, rounding, x, y, z)
-    return _on_border(corner[0], halves[0], rounding), _on_border(corner[1], halves[1], rounding), corner[2]
+    rounding = plate.rounding
+    corner = place_corner(plate.T_plate_body, rounding, x, y, z)
+    return _on_border(corner[0], plate.half_x, rounding), _on_border(corner[1], plate.half_y, rounding), corner[2]
 
 
 @inlined_kernel
-def place_triangle(
-    T: Floats, rounding: float, halves: tuple[float, float], rows: Floats, index: int
-) -> tuple[Triple, Triple, Triple]:
+def place_triangle(plate: PlacedPlate, rows: Floats, index: int) -> tuple[Triple, Triple, Triple]:
     """Return the corners, in the plate's frame, of a triangle: the first nine numbers of a row of (n, >= 9).
 
-    Corners in the planes of the plate, `halves` its half sizes, and of its borders are in them exactly.
+    Corners in the planes of the plate and of its borders are in them exactly.
     """
     return (
-        _place_exactly(T, rounding, halves, rows[index, 0], rows[index, 1], rows[index, 2]),
-        _place_exactly(T, rounding, halves, rows[index, 3], rows[index, 4], rows[index, 5]),
-        _place_exactly(T, rounding, halves, rows[index, 6], rows[index, 7], rows[index, 8]),
+        _place_exactly(plate, rows[index, 0], rows[index, 1], rows[index, 2]),
+        _place_exactly(plate, rows[index, 3], rows[index, 4], rows[index, 5]),
+        _place_exactly(plate, rows[index, 6], rows[index, 7], rows[index, 8]),
     )
 
 

@@ -11,8 +11,8 @@ from replay.numerics.exact_sign import area_or_zero
 from replay.numerics.jit import entry, kernel
 from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
-from replay.sensing.capacitive.midpoint import midpoint_over_triangle
-from replay.sensing.capacitive.placed_plate import faces_centre, place_triangle, write_triangle
+from replay.sensing.capacitive.integral import midpoint_over_triangle
+from replay.sensing.capacitive.placed_plate import faces_centre, place_triangle, placed_plate, write_triangle
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -62,10 +62,10 @@ def sum_triangles(
     for frame in range(n):
         for plate in range(plates):
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
-            T = T_plate_body[frame, plate]
+            here = placed_plate(T_plate_body[frame, plate], half_x, half_y, both, facing, rounding[frame], 0.0)
             total, lost = 0.0, 0.0
             for k in range(len(triangles)):
-                a, b, c = place_triangle(T, rounding[frame], (half_x, half_y), rows, k)
+                a, b, c = place_triangle(here, rows, k)
                 write_triangle(a, b, c, corners)
                 if contact(corners, half_x, half_y, both) != CLEAR:
                     touching[frame, plate] = True

@@ -30,6 +30,7 @@ class Package:
         numerics = Path(replay.__file__).parent / "numerics"
         shutil.copytree(numerics / "jit", self.root / "numerics" / "jit", ignore=shutil.ignore_patterns("__pycache__"))
         shutil.copy(numerics / "compiling.py", self.root / "numerics")
+        shutil.copy(numerics / "remarks.py", self.root / "numerics")
         self.write("geometry/callee.py", CALLEE.format("1.0"))
         self.write("collision/caller.py", CALLER)
 
@@ -42,7 +43,9 @@ class Package:
             os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
 
     def start(self, code: str, **environment: str) -> subprocess.Popen:
-        env = {**os.environ, "NUMBA_CACHE_DIR": str(self.cache), "PYTHONPATH": str(self.root.parent), **environment}
+        # it is about compiling, whether or not the tests' own kernels are compiled
+        own = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
+        env = {**own, "NUMBA_CACHE_DIR": str(self.cache), "PYTHONPATH": str(self.root.parent), **environment}
         command = [sys.executable, "-B", "-c", PROBE + code]  # -B: Python itself goes by time and size
         pipe = subprocess.PIPE
         return subprocess.Popen(command, env=env, stdout=pipe, stderr=pipe, text=True, cwd=self.root.parent)

@@ -59,6 +59,7 @@ def _lengths(rows):
     return result
 
 
+@pytest.mark.compiled
 def test_what_a_kernel_calls_is_lowered_and_only_what_python_calls_is_compiled():
     rows = np.array([[3.0, 4.0], [5.0, 12.0]])
     assert _lengths(rows).tolist() == [5.0, 13.0]
@@ -68,6 +69,7 @@ def test_what_a_kernel_calls_is_lowered_and_only_what_python_calls_is_compiled()
     assert list(_square.overloads) == [(float64,)]
 
 
+@pytest.mark.compiled
 def test_constants_among_arguments_make_no_specialisations(tmp_path, monkeypatch):
     monkeypatch.setattr("replay.numerics.jit.store.directory", lambda: tmp_path)  # nothing is there already
 
@@ -86,6 +88,7 @@ def test_constants_among_arguments_make_no_specialisations(tmp_path, monkeypatch
     assert len(power._lowered) == 1
 
 
+@pytest.mark.compiled
 def test_loops_of_what_a_kernel_calls_become_vectors(tmp_path, monkeypatch):
     monkeypatch.setattr("replay.numerics.jit.store.directory", lambda: tmp_path)  # from a file it would have no code
 
@@ -120,6 +123,7 @@ def test_numbas_own_functions_stay_usable_outside_kernels():
     assert ours(3) == theirs(3) == 1.0
 
 
+@pytest.mark.compiled
 def test_wrong_code_is_a_typing_error_and_leaves_nothing_behind():
     @kernel
     def wrong(x):

@@ -1,6 +1,7 @@
 """Entries are compiled ahead with exactly the types that scenarios call them with."""
 
 import numpy as np
+import pytest
 from numba import float64, int64
 
 from replay.numerics.jit import compile_entries, entries_of, entry, kernel, progress
@@ -22,6 +23,7 @@ def _sum(row):
     return total
 
 
+@pytest.mark.compiled
 def test_entries_are_ready_with_the_types_they_declare(monkeypatch, tmp_path):
     monkeypatch.setattr("replay.numerics.jit.store.directory", lambda: tmp_path)
     shared = []

@@ -9,7 +9,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from replay.numerics import jit
-from replay.numerics.jit import policy
+from replay.numerics.jit import compiler
 
 KERNEL_ROOMS = ("numerics", "geometry", "kinematics", "collision", "sensing")
 
@@ -21,18 +21,20 @@ def total(rows):
     return result
 
 
+@pytest.mark.compiled
 def test_leaf_kernels_compute_what_kernels_do_with_or_without_the_option(monkeypatch):
     rows = np.random.default_rng(1).normal(size=(50, 2))
     expected = jit.kernel(total)(rows)
     leaf = jit.leaf_kernel(total)
     assert leaf.targetoptions["_nrt"] is False
     assert leaf(rows) == expected
-    monkeypatch.setattr(policy, "_counting_is_optional", lambda: False)
+    monkeypatch.setattr(compiler, "UNCOUNTED", {})
     usual = jit.leaf_kernel(total)
     assert "_nrt" not in usual.targetoptions
     assert usual(rows) == expected
 
 
+@pytest.mark.compiled
 def test_a_leaf_kernel_that_allocates_fails_to_compile():
     @jit.leaf_kernel
     def allocates(n):
@@ -42,6 +44,7 @@ def test_a_leaf_kernel_that_allocates_fails_to_compile():
         allocates(3)
 
 
+@pytest.mark.compiled
 def test_leaf_kernels_call_leaf_kernels_only():
     # What a leaf kernel calls is compiled without reference counting too, if it is the first to call it: something that
     # allocates would compile or not depending on what ran before.

@@ -86,6 +86,7 @@ def made(text, monkeypatch, constants="STEP = 1.0\n\n\n@kernel\ndef step(y):\n  
         ("@kernel\ndef inner(x):\n    return [y + 1.0 for y in x]\n", "1.0 -> 2.0"),
     ],
 )
+@pytest.mark.compiled
 def test_whatever_a_kernel_takes_from_elsewhere_is_in_its_key(before, after, monkeypatch):
     old, new = after.split(" -> ")
     if old.startswith(" "):
@@ -119,6 +120,7 @@ def test_comments_docstrings_and_places_in_a_file_compile_nothing_again(monkeypa
     assert key_of(made(plain, monkeypatch), [float64]) == key_of(made(said, monkeypatch), [float64])
 
 
+@pytest.mark.compiled
 def test_an_edit_of_the_cone_sensor_leaves_collision_alone():
     assert not {name for name in (*reached(decide), *reached(sieve)) if name.startswith("replay.sensing.")}
     assert len(reached(decide)) > 30

@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from replay.numerics.jit import progress, store
+from replay.numerics import remarks
+from replay.numerics.jit import store
 
 HITS = "print(outer(1.0), sum(outer.stats.cache_hits.values()))"
 
@@ -44,8 +45,8 @@ def test_an_install_that_cannot_be_written_uses_the_users_cache_folder(package, 
 @pytest.mark.skipif(os.name != "posix", reason="owners and modes are a matter of POSIX")
 def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
     said = []
-    monkeypatch.setattr(progress, "_remark", said.append)
-    monkeypatch.setattr(progress, "_said", set())
+    monkeypatch.setattr(remarks, "_tell", said.append)
+    monkeypatch.setattr(remarks, "_said", set())
     open_to_all, real, own = tmp_path / "open", tmp_path / "real", tmp_path / "own"
     for folder in (open_to_all / "kernels", real, own):
         folder.mkdir(parents=True)
@@ -115,8 +116,8 @@ def test_a_file_that_is_not_what_was_saved_is_as_if_it_were_not_there(folder):
 
 def test_a_full_disk_costs_a_remark_and_no_result(folder, monkeypatch):
     said = []
-    monkeypatch.setattr(progress, "_remark", said.append)
-    monkeypatch.setattr(progress, "_said", set())
+    monkeypatch.setattr(remarks, "_tell", said.append)
+    monkeypatch.setattr(remarks, "_said", set())
 
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -220,7 +221,7 @@ def test_a_group_that_nobody_knows_is_not_private():
     assert not store._is_private(2**31 - 5)
 
 
-def remarks(said):
+def remarks_in(said):
     """Return what was said on stderr but for the progress, which a slow machine tells and a fast one does not."""
     assert "they are kept" not in said
     return [line for line in said.splitlines() if re.match(r"replay: compil(ing|ed \d+) kernels?\b", line) is None]
@@ -245,7 +246,7 @@ def test_on_a_full_disk_kernels_are_read_or_compiled_and_one_line_says_so(packag
     process = package.start(FULL + HITS + "; alone(1.0)")  # two are missing, and it is said once
     out, said = process.communicate()
     assert out.strip() == ("20.0 1" if damage == "none" else "20.0 0"), said
-    assert remarks(said) == [
+    assert remarks_in(said) == [
         "replay: compiled kernels cannot be kept: File too large; the next run compiles them again"
     ]
     assert file.exists() is (damage == "none")
@@ -260,8 +261,8 @@ def test_where_nothing_can_be_kept_kernels_are_compiled_and_one_line_says_so(pac
     process = package.start(code + "outer(1.0); alone(1.0)", **environment)
     out, said = process.communicate()
     assert out.strip() == "None", said
-    assert len(remarks(said)) == 1
-    assert remarks(said)[0].startswith("replay: compiled kernels cannot be kept: ")
+    assert len(remarks_in(said)) == 1
+    assert remarks_in(said)[0].startswith("replay: compiled kernels cannot be kept: ")
 
 
 @pytest.mark.parametrize("damage", ["index", "kernel", "full"])
@@ -273,7 +274,7 @@ def test_numbas_own_cache_is_mended_too(package, damage):
     out, said = process.communicate()
     assert out.strip() == "20.0 0", said
     if damage == "full":
-        assert len(remarks(said)) == 1 and "cannot be kept" in said
+        assert len(remarks_in(said)) == 1 and "cannot be kept" in said
         return
     assert package.run(HITS) == "20.0 1"
     for kept in package.cache.rglob("*.nbi" if damage == "index" else "*.nbc"):

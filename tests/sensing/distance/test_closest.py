@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.sensing.distance import closest_in_cone
+from tests.amounts import cases
 from tests.sensing.distance.cone_families import FAMILIES
 from tests.sensing.distance.meshes import torus
 
@@ -141,7 +142,7 @@ def test_distance_never_grows_with_the_aperture():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=cases(60), deadline=None, derandomize=True)
 def test_rigid_motion_scaling_and_corner_order_change_nothing(seed):
     rng = np.random.default_rng(seed)
     triangles, axes, apertures = FAMILIES["random"](rng, 1)

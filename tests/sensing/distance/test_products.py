@@ -7,6 +7,7 @@ import numpy as np
 
 from replay.numerics.jit import kernel
 from replay.sensing.distance.products import accurate_cross, accurate_normal, fma
+from tests.amounts import cases
 
 
 def exact(vector):
@@ -24,7 +25,7 @@ def relative_error(value, truth):
 
 def test_cross_product_of_nearly_parallel_vectors():
     rng = np.random.default_rng(1)
-    for _ in range(200):
+    for _ in range(cases(200)):
         a = rng.normal(size=3)
         b = a * rng.uniform(0.1, 3.0) + rng.normal(size=3) * 10.0 ** rng.uniform(-17, 0)
         truth = exact_cross(exact(a), exact(b))
@@ -34,7 +35,7 @@ def test_cross_product_of_nearly_parallel_vectors():
 
 def test_normal_of_slivers():
     rng = np.random.default_rng(2)
-    for _ in range(200):
+    for _ in range(cases(200)):
         a, b = rng.normal(size=3), rng.normal(size=3)
         c = a + rng.uniform() * (b - a) + rng.normal(size=3) * 10.0 ** rng.uniform(-15, 0)
         u = [y - x for x, y in zip(exact(a), exact(b), strict=True)]

@@ -194,3 +194,17 @@ def test_bad_methods_are_refused(name, value):
     with pytest.raises(InvalidValue) as error:
         DistanceSuite([], [], **{"method": "rays", name: value})
     assert error.value.name == name
+
+
+@pytest.mark.parametrize("method", ["exact", "rays", "thesis"])
+def test_the_minimum_range_itself_is_not_too_close(method):
+    wall = make_target("wall/slab", 0, grid_of_cubes(1) - [0.5, 0.5, 0.0])
+    linkage = Linkage([Link("wall", None, at(0, 0, 0.75), Joint("wall")), Link("x_eye", None, HERE, Joint("x_eye"))])
+    least = {0.75: Detection.DETECTED, math.nextafter(0.75, 0.0): Detection.DETECTED, 0.5: Detection.DETECTED}
+    least |= {math.nextafter(0.75, 1.0): Detection.TOO_CLOSE, 1.0: Detection.TOO_CLOSE}
+    sensors = [DistanceSensor(f"s{k}", 1, HERE, 0.6, min_range=value) for k, value in enumerate(least)]
+    columns = DistanceSuite(sensors, [wall], method=method, count=61).run(
+        linkage.forward(np.empty((1, 0)), np.empty((1, 0, 4, 4)))
+    )
+    assert columns.distance[0].tolist() == [0.75] * len(least)
+    assert columns.status[0].tolist() == list(least.values())

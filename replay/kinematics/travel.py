@@ -1,0 +1,185 @@
+"""How far each joint moves within an interval of time: rigorous bounds, rounded up.
+
+The travel of a joint is its total variation: what it moves, added up without sign. Equal positions at both ends do not
+mean rest. A piece of a motion is a polynomial; with b_0 .. b_5 its Bernstein coefficients over an interval of local
+time its total variation is at most sum |b_k+1 - b_k|, and equal to that where the differences have one sign. Where they
+do not, the interval is halved until they do or nothing is left to gain. Jumps between pieces (roundings) count as well.
+
+Besides, for bounds that follow a joint along its way: q(s) - q(t0) = x D + e with D = q(t1) - q(t0), x = (s - t0) /
+(t1 - t0), and e between two bounds that are found by the same coefficients.
+
+The rotation of a free joint is about one axis between two key frames, by twice the angle between their quaternions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import float64
+
+from replay.kinematics.timeline import (
+    FREE,
+    TIMELINE_TYPE,
+    Timeline,
+    half_turn,
+    last_at_or_before,
+    polynomial,
+    position,
+    segment,
+)
+from replay.numerics.arrays import Floats
+from replay.numerics.constants import EPSILON
+from replay.numerics.jit import entry, kernel, leaf_kernel
+
+HALVINGS = 40
+"""Cap: an extremum is then known to 1e-12 of the interval, and what is still counted twice is its square."""
+
+ROUNDING = 32.0 * EPSILON
+"""Of the largest sum of |terms| of a polynomial: far above the rounding of its value and of its coefficients."""
+
+TURN_ROUNDING = 32.0 * EPSILON
+"""Error of the angle [rad] between two poses of a free joint."""
+
+TRAVEL, CHANGE, LOWEST, HIGHEST = range(4)
+"""What is written of a scalar joint: total variation, D, and the bounds of e [rad or m]."""
+
+SHIFT, TURN = range(2)
+"""What is written of a free joint: translation [m] and rotation [rad], total variations."""
+
+
+@leaf_kernel
+def joint_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
+    """Write TRAVEL .. HIGHEST of a scalar joint over [t0, t1] [s]; `work` is (HALVINGS + 8, 8) scratch."""
+    q0, q1 = position(line, joint, t0), position(line, joint, t1)
+    begin, end = line.piece_first[joint], line.piece_first[joint + 1]
+    total, rounding, last = 0.0, 0.0, q0
+    low, high = 0.0, 0.0
+    speed = (q1 - q0) / (t1 - t0) if t1 > t0 else 0.0
+    for k in range(max(last_at_or_before(line.start, begin, end, t0), begin), end):
+        c, s = line.coefficients[k], line.start[k]
+        if s > t1:
+            break
+        a, b = max(t0, s), min(t1, line.end[k])
+        if not a < b:
+            continue
+        value = polynomial(c, a - s)
+        # what holds before the piece, and the jump onto it
+        total += abs(value - last)
+        chord = q0 + speed * (a - t0)
+        low, high = min(low, last - chord, value - chord), max(high, last - chord, value - chord)
+        last = polynomial(c, b - s)
+        if c[1] == 0.0 and c[2] == 0.0 and c[3] == 0.0 and c[4] == 0.0 and c[5] == 0.0:
+            chord = q0 + speed * (b - t0)
+            low, high = min(low, last - chord), max(high, last - chord)
+            continue
+        size, power = 0.0, 1.0
+        for i in range(6):
+            size += abs(c[i]) * power
+            power *= b - s
+        rounding = max(rounding, ROUNDING * (size + abs(q0) + abs(q1)))
+        total += _variation(c, a - s, b - s, size, work)
+        _bernstein(c, a - s, b - a, work[0])
+        for i in range(6):
+            deviation = work[0, i] - (q0 + speed * (a - t0 + (b - a) * (i / 5.0)))
+            low, high = min(low, deviation), max(high, deviation)
+    chord = q1 if t1 > t0 else q0
+    low, high = min(low, last - chord), max(high, last - chord)
+    total += abs(q1 - last)
+    found[TRAVEL] = total * (1.0 + ROUNDING) + rounding
+    found[CHANGE] = q1 - q0
+    found[LOWEST], found[HIGHEST] = low - rounding, high + rounding
+
+
+@leaf_kernel
+def _bernstein(c: Floats, a: float, h: float, b: Floats) -> None:
+    """Write the Bernstein coefficients (6,) of a polynomial over [a, a + h]."""
+    # about a, in units of h
+    for i in range(6):
+        b[i] = c[i]
+    for i in range(5):
+        for k in range(4, i - 1, -1):
+            b[k] += a * b[k + 1]
+    power = 1.0
+    for i in range(6):
+        b[i] *= power
+        power *= h
+    # b_k = sum_i C(k, i) / C(5, i) d_i, by adding up differences
+    b[1] /= 5.0
+    b[2] /= 10.0
+    b[3] /= 10.0
+    b[4] /= 5.0
+    for i in range(5):
+        for k in range(5, i, -1):
+            b[k] += b[k - 1]
+
+
+@leaf_kernel
+def _variation(c: Floats, a: float, b: float, size: float, work: Floats) -> float:
+    """Return a bound from above of the total variation of a polynomial over [a, b]; `size` is that of its terms."""
+    total, waiting = 0.0, 1
+    work[1, 6], work[1, 7] = a, b
+    while waiting > 0:
+        row = work[waiting]
+        low, high = row[6], row[7]
+        _bernstein(c, low, high - low, row)
+        path = 0.0
+        for k in range(5):
+            path += abs(row[k + 1] - row[k])
+        gained = path - abs(row[5] - row[0])
+        if gained <= 4.0 * EPSILON * size or waiting > HALVINGS:
+            total += path
+            waiting -= 1
+            continue
+        middle = 0.5 * low + 0.5 * high
+        row[6], row[7] = middle, high
+        waiting += 1
+        work[waiting, 6], work[waiting, 7] = low, middle
+    return total
+
+
+@leaf_kernel
+def free_travel(line: Timeline, free: int, t0: float, t1: float, found: Floats) -> int:
+    """Write SHIFT and TURN of a free joint over [t0, t1] [s]; return how many stretches between key frames that is."""
+    found[SHIFT], found[TURN] = 0.0, 0.0
+    begin, end = line.key_first[free], line.key_first[free + 1]
+    if end - begin < 2 or t1 <= line.key_time[begin] or t0 >= line.key_time[end - 1] + 1.0:
+        return 0
+    stretches, shift, turn, size = 0, 0.0, 0.0, 0.0
+    first, _, from_fraction = segment(line, free, t0)
+    last, _, to_fraction = segment(line, free, t1)
+    for k in range(first, min(last, end - 2) + 1):
+        a = from_fraction if k == first else 0.0
+        b = to_fraction if k == last else 1.0
+        square = 0.0
+        for i in range(3):
+            square += (line.key_xyz[k + 1, i] - line.key_xyz[k, i]) ** 2
+            size = max(size, abs(line.key_xyz[k, i]), abs(line.key_xyz[k + 1, i]))
+        if b > a:
+            stretches += 1
+        shift += np.sqrt(square) * (b - a)
+        turn += 2.0 * half_turn(line, k, k + 1)[0] * (b - a)
+    found[SHIFT] = shift * (1.0 + ROUNDING) + ROUNDING * size
+    found[TURN] = turn * (1.0 + ROUNDING) + TURN_ROUNDING
+    return stretches
+
+
+@entry(TIMELINE_TYPE, float64[::1], float64[:, :, ::1])
+@kernel
+def link_travel(line: Timeline, seconds: Floats, travel: Floats) -> None:
+    """Write how far the joint of each link moves in the intervals between times.
+
+    Args:
+        line: of L links.
+        seconds: (n + 1,) increasing [s].
+        travel: (L, n, 2) out: of a scalar joint its total variation [rad or m] and 0, of a free one SHIFT and TURN.
+    """
+    work, found = np.empty((HALVINGS + 8, 8)), np.empty(4)
+    for link in range(len(line.kind)):
+        for f in range(len(seconds) - 1):
+            travel[link, f, 0], travel[link, f, 1] = 0.0, 0.0
+            if line.joint[link] < 0:
+                continue
+            if line.kind[link] == FREE:
+                free_travel(line, line.joint[link], seconds[f], seconds[f + 1], travel[link, f])
+            else:
+                joint_travel(line, line.joint[link], seconds[f], seconds[f + 1], work, found)
+                travel[link, f, 0] = found[TRAVEL]
