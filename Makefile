@@ -10,6 +10,8 @@ NIGHT := regress
 install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1) || $(call pip,$(1))
 pip = $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt $(1)
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
+# Franka Emika's arm, Apache-2.0
+PANDA := cmeel.prefix/share/example-robot-data/robots/panda_description
 
 .DEFAULT_GOAL := help
 .PHONY: help setup run regress accept freeze test lint format type schemas bench pictures soak plain mutants clean system
@@ -64,6 +66,14 @@ type: $(VENV)/.test  ## check types
 schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
 	$(BIN)/python -m replay.comparison.rules_file
+
+robot: setup  ## import the shipped robot again from its package
+	$(call install,--no-deps example-robot-data)
+	model=$$($(BIN)/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/$(PANDA) && \
+	  $(BIN)/replay import $$model/urdf/panda.urdf --srdf $$model/srdf/panda.srdf --copy-meshes --root-pose '0 0 80cm' \
+	    --acceleration '2 rad/s^2' --acceleration '1 m/s^2' --overwrite -o scenarios/parts/panda.yaml && \
+	  sed -i '1i # yaml-language-server: $$schema=../../schemas/fragment.schema.json' scenarios/parts/panda.yaml && \
+	  cp $$model/LICENSE scenarios/parts/panda/
 
 bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
 	$(call install,-e '.[bench]')

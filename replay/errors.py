@@ -99,6 +99,16 @@ class MeshError(ReplayError):
         super().__init__(f"{file}: {reason}")
 
 
+class RobotError(ReplayError):
+    """A description of a robot cannot be read, contradicts itself, or names a file that is not to be found."""
+
+    def __init__(self, file: str, reason: str, *, line: int | None = None) -> None:
+        self.file = file
+        self.line = line
+        self.reason = reason
+        super().__init__(f"{file}: {reason}" if line is None else f"{file}:{line}: {reason}")
+
+
 class MissingPackageError(ReplayError):
     """A Python package that this input or option needs is not installed."""
 

@@ -58,6 +58,21 @@ RECORD_JSON: Final = 16 * MIB
 HISTORY: Final = 256 * MIB
 """Bytes of a history of nights."""
 
+# Descriptions of robots: URDF, SRDF, COLLADA
+
+ROBOT_XML: Final = 32 * MIB
+"""Bytes of a description."""
+ROBOT_ELEMENTS: Final = 200_000
+"""Elements of a description; a humanoid with hands has 5 000."""
+ROBOT_DEPTH: Final = 100
+"""Elements within elements of a description or a COLLADA file."""
+ROBOT_FOLDERS: Final = 20_000
+"""Folders that are looked into for the packages of a description."""
+ROBOT_PAIRS: Final = 20_000
+"""Pairs of links of a description that are rigid to each other, which a part disables one by one."""
+ROBOT_SAMPLES: Final = 100_000
+"""Random poses that an import checks for collisions."""
+
 # Logs: MCAP and bags
 
 RECORD: Final = GIB

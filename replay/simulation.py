@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from replay.collision.columns import CollisionColumns
 from replay.numerics import transforms
-from replay.numerics.arrays import Floats, Integers
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.scenario.layout import Layout
 from replay.sensing.kinds import KINDS, of_kind
 
@@ -22,11 +22,19 @@ if TYPE_CHECKING:
     from replay.scenario.scene import Scene
     from replay.sensing.kind import Suite
 
-__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "simulate"]
+__all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "block_frames", "simulate"]
 
 
 BLOCK_FRAMES = 256
-"""Frames per block; recorded, because warm-start state resets at block starts."""
+"""Most frames per block."""
+
+PAIR_FRAMES = 1 << 23
+"""Most pairs times frames of a block: results are 20 bytes each, 160 MiB."""
+
+
+def block_frames(pairs: int) -> int:
+    """Return how many frames the blocks of a scene have; recorded, because warm-start state resets at block starts."""
+    return max(1, min(BLOCK_FRAMES, PAIR_FRAMES // max(pairs, 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +85,7 @@ class Simulation:
         from replay.kinematics.motion import plan
 
         self.scene = scene
+        self._block_frames = block_frames(len(scene.pairs))
         self._motion = plan(scene.linkage, scene.script)
         self._proven = scene.model.collision.between == "proven"
         self.collision = _collision(scene, self._motion if self._proven else None)
@@ -91,7 +100,7 @@ class Simulation:
 
     def block(self, first: int) -> FrameBlock:
         """Return the block that begins at a frame; it depends on no other block."""
-        last = min(first + BLOCK_FRAMES, self.scene.frames)
+        last = min(first + self._block_frames, self.scene.frames)
         lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
         time = self.scene.time_ns(first - lead, last)
         states = self._motion.states(time / 1e9)
@@ -110,14 +119,14 @@ class Simulation:
 
     def blocks(self) -> Iterator[FrameBlock]:
         """Yield all blocks in order."""
-        for first in range(0, self.scene.frames, BLOCK_FRAMES):
+        for first in range(0, self.scene.frames, self._block_frames):
             yield self.block(first)
 
 
 def simulate(
     scenario: Scenario, *, model: Model | str | Path | None = None, savings: bool = True
 ) -> Iterator[FrameBlock]:
-    """Yield a scenario's frames in blocks of `BLOCK_FRAMES`, the last one shorter.
+    """Yield a scenario's frames in blocks of `block_frames`, the last one shorter.
 
     Args:
         scenario: what `replay.load` returned.
@@ -137,6 +146,32 @@ def simulate(
     from replay.scenario.scene import build
 
     yield from Simulation(build(scenario, model=model, savings=savings)).blocks()
+
+
+def touching(scene: Scene, positions: Floats, free_poses: Floats) -> Iterator[Flags]:
+    """Yield which pairs are in contact in any states of the joints, in blocks (k, P).
+
+    Args:
+        scene: whose pairs they are, in the order of its layout.
+        positions: (n, J) [rad or m], in the order of its linkage's joints.
+        free_poses: (n, K, 4, 4), of its free joints.
+    """
+    from replay.collision.columns import Level
+
+    collision = _collision(scene, None)
+    for first in range(0, len(positions) if collision else 0, BLOCK_FRAMES):
+        chosen = slice(first, first + BLOCK_FRAMES)
+        assert collision is not None
+        yield collision.run(scene.linkage.forward(positions[chosen], free_poses[chosen])).level == Level.CONTACT
+
+
+def touching_first(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the pairs that are in contact in the first frame."""
+    from replay.kinematics.motion import sample
+
+    states = sample(scene.linkage, scene.script, scene.seconds(0, 1))
+    found = touching(scene, states.positions, states.free_poses)
+    return tuple(name for flags in found for name, met in zip(scene.layout.pairs, flags[0], strict=True) if met)
 
 
 def _collision(scene: Scene, motion: Motion | None) -> CollisionPipeline | None:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -17,6 +18,8 @@ def pytest_configure(config: pytest.Config) -> None:
     progress.tell_by(lambda state: None)  # else it would be in what tests read on stderr
     remarks.tell_by(lambda text: None)
     settings.load_profile("soak" if config.option.markexpr == "soak" else "seeded")
+    if not COMPILED:
+        np.seterr(all="ignore")  # compiled kernels go on with infinities and NaN, and say nothing
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

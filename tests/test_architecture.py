@@ -24,6 +24,7 @@ ROOMS = (
     "sensing",
     "scenario",
     "simulation",
+    "robots",
     "recording",
     "comparison",
     "batch",

@@ -8,7 +8,7 @@ import pytest
 import replay
 from replay.scenario.methods import BUILTIN_MODELS
 from replay.scenario.scene import build
-from replay.simulation import BLOCK_FRAMES, Simulation
+from replay.simulation import BLOCK_FRAMES, Simulation, block_frames
 
 SCENE = """
 version: 1
@@ -61,6 +61,11 @@ def test_blocks_hold_all_frames_once_and_in_order(swing):
     assert [len(block.time) for block in blocks] == [BLOCK_FRAMES, BLOCK_FRAMES, 601 - 2 * BLOCK_FRAMES]
     assert [block.first for block in blocks] == [0, BLOCK_FRAMES, 2 * BLOCK_FRAMES]
     assert np.concatenate([block.time for block in blocks]).tolist() == [k * 10_000_000 for k in range(601)]
+
+
+@pytest.mark.parametrize(("pairs", "frames"), [(0, 256), (319, 256), (32_768, 256), (179_700, 46), (10**8, 1)])
+def test_blocks_of_many_pairs_have_fewer_frames(pairs, frames):
+    assert block_frames(pairs) == frames
 
 
 def test_a_block_is_the_same_whoever_computes_it_and_in_whatever_order(swing):

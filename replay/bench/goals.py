@@ -78,6 +78,10 @@ PROMISES: dict[str, Promise] = {
     "start.modules": _at_most("replay validate, of numba, rerun, trimesh loaded", "-", 0.0),
     "cold.kernels": Promise("compiling carm_bodyguard's kernels, CPU", "numba's public decorator", 2.0),
     "savings.same": _at_most("values that differ beyond their bound without savings", "the same run with", 0.0),
+    "between.proven": Promise("pair-intervals of shipped scenes that are proven or found", "all of them", 0.9999, ""),
+    "between.wrong": _at_most("times of contacts outside their brackets, contacts missed", "closed forms", 0.0),
+    "between.own": Promise("collision with a look between frames, worst shipped scene", "the same run sampled", 1.0),
+    "between.fast": Promise("the same at 1 kHz", "the same run sampled", 1.0, stretch=2.0),
     "stability": _at_most("hard families: wrong, NaN, refused, hangs, crashes of ours", "long precision", 0.0),
 }
 """By key, in the order in which they are shown."""

@@ -34,6 +34,7 @@ SCENES = (
     "carm_parking",
     "experiments/parallel_10cm",
     "doctor_walks_in",
+    "panda_meets_person",
     "carm_near",
     "carm_head_contact",
     "carm_clear",

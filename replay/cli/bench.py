@@ -13,7 +13,7 @@ from replay.cli.options import format_option, note, say
 from replay.cli.values import PathName
 
 BENCHMARKS = (
-    *("collision", "distance", "capacitive", "pipeline", "savings"),
+    *("collision", "between", "distance", "capacitive", "pipeline", "savings"),
     *("scaling", "stability", "recording", "diff", "start"),
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import errno
 import importlib
+import keyword
 import os
 import sys
 import traceback
@@ -21,6 +22,7 @@ from replay.errors import ReplayError
 COMMANDS = {
     "run": "simulate scenarios and record them",
     "validate": "check scenarios without running them",
+    "import": "make a part of a robot's description (URDF, SRDF)",
     "info": "say what is in a recording",
     "schema": "print the JSON Schema of scenarios, for editors",
     "calibrate": "fit a capacitive sensor to a measured curve",
@@ -32,7 +34,7 @@ COMMANDS = {
     "view": "show recordings in the rerun viewer, or make a picture",
     "bench": "time methods and peers on the same questions, and check their answers",
 }
-"""Help by name of command; each is the function of that name in the module of that name."""
+"""Help by name of command; each is the function of that name in the module of that name, `import_` for `import`."""
 
 MAX_LINES = 100
 """Lines of one error that are shown; a mistake in a sweep is one line for each of its cases."""
@@ -49,6 +51,7 @@ class LazyGroup(click.Group):
         """Return a command, importing its module."""
         if name not in COMMANDS:
             return None
+        name += "_" * keyword.iskeyword(name)
         command: click.Command = getattr(importlib.import_module(f"replay.cli.{name}"), name)
         return command
 

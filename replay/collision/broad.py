@@ -18,9 +18,9 @@ from replay.geometry.overlap import aabbs_meet, obbs_meet, spheres_meet
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, inlined_kernel, leaf_kernel
 
-COUNTS = 4
-BY_BLOCK, BY_REPEAT, BY_SPHERE, BY_VOLUME = range(COUNTS)
-"""Rows of the counters: pair-frames settled by each sieve, and by a pose that repeats."""
+COUNTS = 5
+BY_BLOCK, BY_REPEAT, BY_SPHERE, BY_VOLUME, BY_WAY = range(COUNTS)
+"""Rows of the counters: pair-frames settled by each sieve, by a pose that repeats, and by how far bodies can move."""
 
 _SLACK = 2.0**-44
 """Relative to the lengths that enter a distance of spheres: far above their rounding."""
@@ -126,8 +126,8 @@ def sieve(
                 level[f, p], task[f, p] = 0, SKIP
             continue
         for f in range(n):
-            repeats = f > 0 and _same(poses[q, f], poses[q, f - 1])
-            if repeats and (volumes.kind != AABB or _same(turns[link, f], turns[link, f - 1])):
+            repeats = f > 0 and same_pose(poses[q, f], poses[q, f - 1])
+            if repeats and (volumes.kind != AABB or same_pose(turns[link, f], turns[link, f - 1])):
                 counts[BY_REPEAT] += 1
                 level[f, p], task[f, p] = level[f - 1, p], REPEAT
                 continue
@@ -155,7 +155,8 @@ def keep_all(volumes: Volumes, frames: PairFrames, scratch: Floats) -> None:
 
 
 @inlined_kernel
-def _same(a: Floats, b: Floats) -> bool:
+def same_pose(a: Floats, b: Floats) -> bool:
+    """Return whether two matrices are the same, element by element."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             if a[i, j] != b[i, j]:

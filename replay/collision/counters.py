@@ -20,6 +20,7 @@ class Counters:
         pruned_by_block: ruled out for a whole block, by the tree over all bodies or by the pair's swept spheres.
         pruned_by_sphere: ruled out by bounding spheres in a frame.
         pruned_by_volume: ruled out by the bounding volumes in a frame.
+        pruned_by_way: ruled out because the bodies cannot have come near since they were looked at last.
         repeated: answered from the frame before, the pose being the same.
         narrow: looked at by the narrow phase.
         boxes: pairs of tree boxes bounded.
@@ -29,9 +30,8 @@ class Counters:
         contacts: at level contact.
         contained: contacts of a body wholly inside another.
         undecided: at level contact because GJK reached its accuracy limit.
-        intervals: between frames, of pairs that were looked at there; those of the rest are clear by the same bounds.
-        intervals_by_block: of those, proven for the whole block at once.
-        intervals_by_frames: proven by what is known at their ends.
+        intervals: between frames, asked for.
+        intervals_by_frames: proven by what is known at their ends; what is not told here was proven for a whole block.
         intervals_searched: in doubt, and searched.
         moments: poses between frames that the search looked at.
         moment_queries: pairs of convex sets decided there.
@@ -44,6 +44,7 @@ class Counters:
     pruned_by_block: int = 0
     pruned_by_sphere: int = 0
     pruned_by_volume: int = 0
+    pruned_by_way: int = 0
     repeated: int = 0
     narrow: int = 0
     boxes: int = 0
@@ -54,7 +55,6 @@ class Counters:
     contained: int = 0
     undecided: int = 0
     intervals: int = 0
-    intervals_by_block: int = 0
     intervals_by_frames: int = 0
     intervals_searched: int = 0
     moments: int = 0
@@ -62,8 +62,6 @@ class Counters:
 
     def add_intervals(self, proven: Sequence[int], searched: Sequence[int]) -> None:
         """Add the counts of `interval_proof.certify` and of `crossing_search.search`."""
-        self.intervals += sum(proven)
-        self.intervals_by_block += proven[interval_proof.BY_BLOCK]
         self.intervals_by_frames += proven[interval_proof.BY_FRAMES]
         self.intervals_searched += proven[interval_proof.IN_DOUBT]
         self.moments += searched[crossing_search.MOMENTS]
@@ -74,6 +72,7 @@ class Counters:
         self.pruned_by_block += sieved[broad.BY_BLOCK]
         self.pruned_by_sphere += sieved[broad.BY_SPHERE]
         self.pruned_by_volume += sieved[broad.BY_VOLUME]
+        self.pruned_by_way += sieved[broad.BY_WAY]
         self.repeated += sieved[broad.BY_REPEAT]
         self.boxes += decided[traversal.BOXES]
         self.gjk_queries += decided[traversal.QUERIES]

@@ -19,7 +19,7 @@ from numba import float64, int64, uint8
 
 from replay.collision import traversal
 from replay.collision.bodies import AABB, BODIES_TYPE, OBB, VOLUMES_TYPE, Bodies, Volumes
-from replay.collision.broad import sphere_gap, volumes_meet
+from replay.collision.broad import volumes_meet
 from replay.collision.directed import Lines, lines, measure_changes, write_lines
 from replay.collision.gjk_exact import SEPARATED, UNDECIDED, Workspace, workspace
 from replay.collision.gjk_kernel import ROUNDING
@@ -27,6 +27,7 @@ from replay.collision.narrow import hold_each_other
 from replay.collision.piece_proof import Ends, apart_by_pieces, apart_in_world, ends, sets_apart, write_end
 from replay.collision.support import SETS_TYPE, Sets
 from replay.collision.traversal import STACK, closest
+from replay.collision.volume_gap import boxes_gap
 from replay.collision.way_steps import (
     BALL,
     CHAINS_TYPE,
@@ -39,7 +40,6 @@ from replay.collision.way_steps import (
     place,
     way_scratch,
 )
-from replay.geometry.overlap import obbs_gap
 from replay.kinematics.timeline import TIMELINE_TYPE, Timeline, last_at_or_before
 from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel, record
@@ -50,6 +50,9 @@ LOOKS = 1024
 PARTS = 8
 """The shortest part that is looked at is this part of the resolution: so a meeting stays within the resolution, even
 where the parts just before it cannot be proven."""
+
+PROVEN_SHARE, PROVEN_ROUNDING = 1.0 - 2.0**-38, 8.0 * ROUNDING
+"""Of a distance, and of all lengths: GJK accepts one whose proven lower bound is within 1e-12 and its rounding."""
 
 DEPTH = 80
 """Moments waiting: each halves what is left of at most 2^63 ns."""
@@ -123,29 +126,6 @@ def _search(links: int, corners: Sets, counts: Integers) -> Search:
     )
 
 
-@leaf_kernel
-def boxes_gap(volumes: Volumes, a: int, b: int, pose: Floats, turn: Floats, scratch: Floats) -> float:
-    """Return a lower bound on the distance [m] of two bodies' volumes that do not meet; arguments of `volumes_meet`."""
-    gap = sphere_gap(volumes, a, b, pose)
-    if volumes.kind == OBB:
-        box = obbs_gap(
-            volumes.center[a],
-            volumes.half[a],
-            volumes.axes[a],
-            volumes.center[b],
-            volumes.half[b],
-            volumes.axes[b],
-            pose,
-        )
-        gap = max(gap, box)
-    elif volumes.kind == AABB:  # `volumes_meet` left both boxes in the scratch
-        for i in range(3):
-            reach = scratch[5, i] + scratch[7, i]
-            size = reach + abs(scratch[i, 3]) + abs(scratch[4, i]) + abs(scratch[6, i])
-            gap = max(gap, abs(scratch[i, 3] + scratch[6, i] - scratch[4, i]) - reach - 2.0**-44 * size)
-    return gap
-
-
 @kernel
 def look(
     bodies: Bodies,
@@ -198,11 +178,8 @@ def look(
 
 @leaf_kernel
 def proven_distance(distance: float, size: float) -> float:
-    """Return a lower bound on the distance [m] of two bodies that GJK says are `distance` apart, or farther than that.
-
-    GJK accepts a distance whose proven lower bound is within 1e-12 of it and its rounding, see `gjk_kernel`.
-    """
-    return distance * (1.0 - 2.0**-38) - 8.0 * ROUNDING * size
+    """Return a lower bound on the distance [m] of two bodies that are `distance` apart by GJK, or farther."""
+    return distance * PROVEN_SHARE - PROVEN_ROUNDING * size
 
 
 @kernel

@@ -10,26 +10,100 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import boolean, float64, int64, uint8
+from numba import float64, int64, uint8
 
-from replay.collision.bodies import VOLUMES_TYPE, Volumes
+from replay.collision.bodies import AABB, BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
-from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, boxes_gap, proven_distance
+from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
+from replay.collision.volume_gap import boxes_gap
+from replay.collision.way_sieve import root_gap, root_ratio
+from replay.kinematics.linkage import POSE_ROUNDING
 from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
-COUNTS = 3
-BY_BLOCK, BY_FRAMES, IN_DOUBT = range(COUNTS)
-"""Counters of pair-intervals: proven for a whole block, by the frames' distances, and left to the search."""
+COUNTS = 2
+BY_FRAMES, IN_DOUBT = range(COUNTS)
+"""Counters of pair-intervals: proven by the frames' distances, and left to the search."""
 
 CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 """As `columns.Between`."""
 
+FAR, QUIET, NEAR = range(3)
+"""What a block may hold of a pair: no bound below the largest one that is told; nothing within the limit in any frame,
+and all intervals proven by that; or more."""
+
+
+@entry(
+    BODIES_TYPE,
+    VOLUMES_TYPE,
+    int64[:, ::1],
+    float64[:, :, :, ::1],
+    int64[:, ::1],
+    float64[::1],
+    float64[::1],
+    float64[::1],
+    float64,
+    float64,
+    uint8[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+    float64[::1],
+)
+@leaf_kernel
+def sort_out(
+    bodies: Bodies,
+    volumes: Volumes,
+    pairs: Integers,
+    middle: Floats,
+    rows: Integers,
+    half: Floats,
+    longest: Floats,
+    rounding: Floats,
+    limit: float,
+    cap: float,
+    kinds: Bytes,
+    scratch: Floats,
+    rotation: Floats,
+    translation: Floats,
+) -> None:
+    """Find out which pairs a block need not be looked at for, by its middle frame and the ways of its bodies.
+
+    Args:
+        bodies, volumes: of the scene.
+        pairs: (P, 4) as `PairFrames.pairs`.
+        middle: (Q, 1, 4, 4) T_a_b of the links in the middle frame.
+        rows: (P, 4) as of `certify`.
+        half: (V,) sum of each way from the middle frame to either end of the block, the larger one [m].
+        longest: (V,) each way in the interval in which it is longest [m].
+        rounding: (V,) see `ways.fill_ways`.
+        limit, cap: as of `certify`.
+        kinds: (P,) out, FAR, QUIET or NEAR.
+        scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
+    """
+    for p in range(len(pairs)):
+        a, b, pose = pairs[p, 0], pairs[p, 1], middle[pairs[p, 2], 0]
+        gap = sphere_gap(volumes, a, b, pose)
+        way, wide, step = 0.0, 0.0, 0.0
+        for k in range(2):
+            way += half[rows[p, k]] + 2.0 * rounding[rows[p, k]]
+            wide += half[rows[p, 2 + k]] + 2.0 * rounding[rows[p, 2 + k]]
+            step += longest[rows[p, k]] + 2.0 * rounding[rows[p, k]]
+        kinds[p] = NEAR
+        if gap > max(cap + way, wide):
+            kinds[p] = FAR
+        elif 0.0 < limit < np.inf and volumes.kind != AABB:
+            size = (rounding[rows[p, 0]] + rounding[rows[p, 1]]) / POSE_ROUNDING
+            margin = 2.0**-43 * size
+            root = root_gap(bodies, a, b, pose, size, rotation, translation)
+            quiet = root - limit - margin > root_ratio(bodies, volumes, a, b) * way
+            quiet = quiet and 2.0 * proven_distance(limit, size) > step * (1.0 + 2.0**-40)
+            if quiet and boxes_gap(volumes, a, b, pose, rotation, scratch) > way + margin:
+                kinds[p] = QUIET
+
 
 @entry(
     VOLUMES_TYPE,
-    float64[::1],
     PAIR_FRAMES_TYPE,
     PAIR_FRAMES_TYPE,
     int64,
@@ -38,7 +112,6 @@ CLEAR, CONTACT, UNDECIDED = 0, 1, 2
     float64[::1],
     float64,
     float64,
-    boolean,
     uint8[:, ::1],
     float64[:, ::1],
     uint8[:, ::1],
@@ -48,7 +121,6 @@ CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 @leaf_kernel
 def certify(
     volumes: Volumes,
-    reach: Floats,
     frames: PairFrames,
     head: PairFrames,
     begin: int,
@@ -57,7 +129,6 @@ def certify(
     rounding: Floats,
     limit: float,
     cap: float,
-    savings: bool,
     between: Bytes,
     bound: Floats,
     doubt: Bytes,
@@ -68,7 +139,6 @@ def certify(
 
     Args:
         volumes: of all bodies.
-        reach: (B,) of all bodies, see `bodies.Bodies`.
         frames: of n frames, decided by the narrow phase.
         head: of the frame before the first one, read if `begin` is 0.
         begin: 0, or 1 if there is no frame before the first one.
@@ -76,7 +146,6 @@ def certify(
         ways, rounding: see `ways.fill_ways`; column f - begin is of the interval that ends at frame f.
         limit: up to which the narrow phase looked for distances [m].
         cap: largest bound that is told [m].
-        savings: whether pairs are ruled out for the whole block.
         between, bound: (n, P) out; `bound` is NaN and `between` UNDECIDED where there is doubt of a contact.
         doubt: (n, P) out, bits of `crossing_search`.
         counts: (COUNTS,) added to.
@@ -86,67 +155,64 @@ def certify(
     for p in range(len(frames.pairs)):
         a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
         way_a, way_b, wide_a, wide_b = rows[p, 0], rows[p, 1], rows[p, 2], rows[p, 3]
+        size = (rounding[way_a] + rounding[way_b]) / POSE_ROUNDING  # no less than the bodies' reach and offset
         error, wide_error = 2.0 * (rounding[way_a] + rounding[way_b]), 2.0 * (rounding[wide_a] + rounding[wide_b])
-        total, wide_total = error, wide_error
-        for f in range(begin, n):
-            total += ways[way_a, f - begin] + ways[way_b, f - begin]
-            wide_total += ways[wide_a, f - begin] + ways[wide_b, f - begin]
-        if savings and sphere_gap(volumes, a, b, frames.poses[q, n // 2]) > max(cap + total, wide_total):
-            counts[BY_BLOCK] += n - begin
-            for f in range(begin, n):
-                between[f, p], bound[f, p], doubt[f, p] = CLEAR, cap, 0
-            continue
-        gap1, near1, level1 = 0.0, 0.0, 0
-        unsure1 = False
+        near1, level1, unsure1, left = 0.0, 0, False, 0.0
         for f in range(begin - 1, n):
-            gap0, near0, level0, unsure0 = gap1, near1, level1, unsure1
+            near0, level0, unsure0 = near1, level1, unsure1
             if f < 0:
                 pose, level1, unsure1 = head.poses[q, 0], head.level[0, p], head.undecided[0, p]
                 clearance = head.clearance[0, p]
             else:
                 pose, level1, unsure1 = frames.poses[q, f], frames.level[f, p], frames.undecided[f, p]
                 clearance = frames.clearance[f, p]
-            gap1 = sphere_gap(volumes, a, b, pose)
-            near1 = gap1
+            near1 = 0.0
             if level1 < 2:
-                size = reach[a] + reach[b] + abs(pose[0, 3]) + abs(pose[1, 3]) + abs(pose[2, 3])
-                near1 = max(gap1, proven_distance(limit if math.isnan(clearance) else clearance, size), 0.0)
+                near1 = max(proven_distance(limit if math.isnan(clearance) else clearance, size), 0.0)
             if f < begin:
                 continue
             way = ways[way_a, f - begin] + ways[way_b, f - begin]
             if way > 0.0:
                 way += error
             between[f, p], bound[f, p], doubt[f, p] = CLEAR, 0.0, 0
-            least = 0.5 * (near0 + near1 - way)
+            # the bodies
             if level0 == 2 or level1 == 2:
                 proven = (level0 == 2 and not unsure0) or (level1 == 2 and not unsure1)
                 between[f, p] = CONTACT if proven else UNDECIDED
                 if level0 != level1 and (level0 < 2 or level1 < 2):
                     doubt[f, p] |= CONTACT_DOUBT
-            elif least > 0.0 or way == 0.0:
-                bound[f, p] = min(max(least, 0.0), cap)
             else:
-                doubt[f, p] |= CONTACT_DOUBT
+                least = 0.5 * (near0 + near1 - way)
+                if not least > 0.0 and way > 0.0:
+                    before = head.poses[q, 0] if f == 0 else frames.poses[q, f - 1]
+                    least = max(near0, sphere_gap(volumes, a, b, before))
+                    least = 0.5 * (least + max(near1, sphere_gap(volumes, a, b, pose)) - way)
+                if not least > 0.0 and way > 0.0:
+                    doubt[f, p] |= CONTACT_DOUBT
+                bound[f, p] = min(max(least, 0.0), cap)
+            # their volumes
+            wide = ways[wide_a, f - begin] + ways[wide_b, f - begin]
+            if wide > 0.0:
+                wide += wide_error
+            left -= wide
             if (level0 == 0) != (level1 == 0):
                 doubt[f, p] |= BOUNDS_DOUBT
-            elif level0 == 0:
-                wide = ways[wide_a, f - begin] + ways[wide_b, f - begin]
-                if wide > 0.0:
-                    wide += wide_error
-                if wide > 0.0 and not gap0 + gap1 > wide:
-                    boxes = 0.0
-                    for k in range(2):
-                        at = head.poses[q, 0] if f + k == 0 else frames.poses[q, f + k - 1]
-                        turned = head.turns[turn, 0] if f + k == 0 else frames.turns[turn, f + k - 1]
-                        if volumes_meet(volumes, a, b, at, turned, scratch):
-                            boxes = -np.inf
-                        else:
-                            boxes += max(boxes_gap(volumes, a, b, at, turned, scratch), 0.0)
-                    if not boxes > wide:
-                        doubt[f, p] |= BOUNDS_DOUBT
-                    elif doubt[f, p] & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
-                        doubt[f, p] = 0
-                        bound[f, p] = min(0.5 * (boxes - way), cap)
+            elif level0 == 0 and wide > 0.0 and (left <= 0.0 or doubt[f, p] & CONTACT_DOUBT):
+                boxes = 0.0
+                for k in range(2):
+                    at = head.poses[q, 0] if f + k == 0 else frames.poses[q, f + k - 1]
+                    turned = head.turns[turn, 0] if f + k == 0 else frames.turns[turn, f + k - 1]
+                    left = 0.0
+                    if not volumes_meet(volumes, a, b, at, turned, scratch):
+                        left = max(boxes_gap(volumes, a, b, at, turned, scratch), 0.0)
+                    boxes += left
+                if not boxes > wide:
+                    doubt[f, p] |= BOUNDS_DOUBT
+                elif doubt[f, p] & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
+                    doubt[f, p] = 0
+                    bound[f, p] = min(0.5 * (boxes - way), cap)
+            if level1 > 0:
+                left = 0.0
             if doubt[f, p] & CONTACT_DOUBT and level0 < 2 and level1 < 2:
                 between[f, p], bound[f, p] = UNDECIDED, np.nan
             counts[BY_FRAMES if doubt[f, p] == 0 else IN_DOUBT] += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,12 +11,12 @@ from replay.collision import crossing_search, interval_proof
 from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
-from replay.collision.crossing_search import Questions
+from replay.collision.crossing_search import PROVEN_ROUNDING, PROVEN_SHARE, Questions
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_steps import Chains
 from replay.collision.ways import fill_ways, first_ways
-from replay.kinematics.linkage import Linkage, LinkPoses
+from replay.kinematics.linkage import POSE_ROUNDING, Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
@@ -41,6 +42,13 @@ class Course:
     begin: int
     ways: Floats
     rounding: Floats
+
+    @cached_property
+    def sums(self) -> tuple[Floats, Floats]:
+        """Each way from the block's middle frame to its ends, the larger one, and in its longest interval (V,) [m]."""
+        middle = (self.ways.shape[1] + 1) // 2
+        parts = [self.ways[:, :middle].sum(axis=1), self.ways[:, middle:].sum(axis=1)]
+        return np.maximum(*parts) * (1.0 + 2.0**-40), self.ways.max(axis=1, initial=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +108,18 @@ class Intervals:
         m = len(time) - 1
         travel = np.zeros((len(self._linkage.links), m, 2))
         link_travel(self._line, time / 1e9, travel)
-        ways, rounding = np.empty((self._first[-1], m)), np.empty(self._first[-1])
-        points, local = np.empty((m + 1, 3)), np.ascontiguousarray(poses.local)
-        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, points, ways, rounding)
-        return Course(time, first + 1 - lead, 1 - lead, ways, rounding)
+        return self._course(np.ascontiguousarray(poses.local), travel, time, first + 1 - lead, 1 - lead)
 
-    def still(self) -> Course:
-        """Return a course on which nothing moves, of one frame."""
-        time = np.zeros(2, dtype=np.int64)
-        return Course(time, 0, 0, np.zeros((self._first[-1], 1)), np.zeros(self._first[-1]))
+    def _course(self, local: Floats, travel: Floats, time: Integers, first: int, begin: int) -> Course:
+        ways, rounding = np.empty((self._first[-1], len(local) - 1)), np.empty(self._first[-1])
+        points = np.empty((len(local), 3))
+        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, points, ways, rounding)
+        return Course(time, first, begin, ways, rounding)
+
+    def still(self, poses: LinkPoses) -> Course:
+        """Return a course of one interval on which nothing moves from the first of some poses."""
+        travel = np.zeros((len(self._linkage.links), 1, 2))
+        return self._course(np.repeat(poses.local[:1], 2, axis=0), travel, np.zeros(2, dtype=np.int64), 0, 0)
 
     def clear(self, shape: tuple[int, int], course: Course) -> tuple[Bytes, Floats]:
         """Return the columns of pairs that are clear and farther apart than the largest bound that is told."""
@@ -131,6 +142,46 @@ class Intervals:
         near = self._first[pairs] + shared[:, None]
         return np.concatenate([near, self._first[pairs] if self._volumes.kind == AABB else near], axis=1)
 
+    def sorted_out(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> Bytes:
+        """Return what a block may hold of pairs (P,): `interval_proof.FAR`, QUIET or NEAR.
+
+        Those that are not NEAR are clear in all its frames and intervals.
+
+        Args:
+            pairs: (P, 4) as `PairFrames.pairs`.
+            middle: (Q, 1, 4, 4) T_a_b of the links in the block's middle frame.
+            rows: of `Course.ways`.
+            course: of the block.
+        """
+        kinds = np.empty(len(pairs), dtype=np.uint8)
+        half, longest = course.sums
+        scratch = np.zeros((8, 4)), np.empty((3, 3)), np.empty(3)
+        interval_proof.sort_out(
+            self._bodies,
+            self._volumes,
+            pairs,
+            middle,
+            rows,
+            half,
+            longest,
+            course.rounding,
+            self._limit,
+            self._cap,
+            kinds,
+            *scratch,
+        )
+        return kinds
+
+    def quiet(self, rows: Integers, course: Course) -> Floats:
+        """Return the bounds (m, c) of QUIET pairs over the m intervals of a block, as `certify` has them."""
+        way = course.ways[rows[:, 0]] + course.ways[rows[:, 1]]
+        error = 2.0 * (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]])
+        size = (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]]) / POSE_ROUNDING
+        near = np.maximum(self._limit * PROVEN_SHARE - PROVEN_ROUNDING * size, 0.0)
+        least = 0.5 * (near[:, None] + near[:, None] - np.where(way > 0.0, way + error[:, None], way))
+        bound: Floats = np.minimum(np.maximum(least, 0.0), self._cap).T
+        return bound
+
     def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:
         """Return what is known of pairs that were decided in all frames of a block, and in the frame before it."""
         n, count = frames.level.shape
@@ -140,7 +191,6 @@ class Intervals:
         head = frames if head is None else head
         interval_proof.certify(
             self._volumes,
-            self._bodies.reach,
             frames,
             head,
             course.begin,
@@ -149,7 +199,6 @@ class Intervals:
             course.rounding,
             self._limit,
             self._cap,
-            self._savings,
             between,
             bound,
             doubt,

@@ -14,8 +14,7 @@ from replay.language.globs import Globs
 from replay.numerics.arrays import Flags, Integers
 
 MOST_PAIRS = 500_000
-"""Most pairs that are listed, those of 1 000 bodies: results hold a column for each, 11 bytes a frame, which is 1.4 GB
-for a block of 256 frames."""
+"""Most pairs that are listed, those of 1 000 bodies: results hold columns for each, 20 bytes a frame."""
 
 
 @dataclass(frozen=True, eq=False)

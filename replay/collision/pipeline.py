@@ -25,6 +25,7 @@ from replay.collision import (
     scan,
     support,
     traversal,
+    way_sieve,
     ways,
 )
 from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
@@ -68,7 +69,7 @@ def kernels(
     used += [decomposition] if pieces == "convex" else []
     used += [traversal] if narrowphase == "fcl" else [narrow if savings else scan]
     if between == "proven":
-        used += [travel, ways, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
+        used += [travel, ways, way_sieve, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
     return (*entries_of(*used), broad.sieve if savings else broad.keep_all)
 
 
@@ -147,9 +148,12 @@ class CollisionPipeline:
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
+            self._bodies = arrays
             self.narrow_phase = _engine(narrowphase, chosen, arrays, savings)
         # between frames distances are our own, whatever decides at the frames
-        self._own = partial(narrow.decide, arrays) if chosen and narrowphase == "fcl" else None
+        self._own: NarrowPhase | None = None
+        if chosen and motion is not None and narrowphase == "fcl":
+            self._own = partial(narrow.decide, arrays)
         self._cap = math.inf if clearance == "always" else float(margin)
         self._intervals: Intervals | None = None
         if chosen and motion is not None:
@@ -207,6 +211,7 @@ class CollisionPipeline:
         if self._intervals is not None and time is not None and len(time) > 1:
             course = self._intervals.course(poses, lead, time, first)
             between, bound = self._intervals.clear(shape, course)
+            self.counters.intervals += (shape[0] - course.begin) * shape[1]
             columns = replace(columns, between=between, clearance_bound=bound)
         crossings = []
         for found in self._evaluate(poses, lead, course):
@@ -263,20 +268,20 @@ class CollisionPipeline:
         if n == 0 or self._pairs.count == 0:
             return
         if self._static is None:
-            still = None if self._intervals is None else self._intervals.still()
             one = poses.slice(0, 1)
+            still = None if self._intervals is None else self._intervals.still(one)
             self._static = []
             if self._pairs.static_count:
                 fixed = self._candidates(one, still).fixed()
                 self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
-                self._static = [self._work(batch, one, 0, still) for batch in self._batches(fixed)]
+                self._static = [found for batch in self._batches(fixed) for found in self._work(batch, one, 0, still)]
         self.counters.static += n * self._pairs.static_count
         yield from self._static
         if self._all is None:
             moving = self._candidates(poses, course).moving()
             self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
         for batch in self._always if self._all is not None else self._batches(moving):
-            yield self._work(batch, poses, lead, course)
+            yield from self._work(batch, poses, lead, course)
 
     def _candidates(self, poses: LinkPoses, course: Course | None) -> Selected:
         if self._all is not None:
@@ -286,30 +291,89 @@ class CollisionPipeline:
             reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> _Found:
-        frames = self._decided(batch, poses.slice(lead, len(poses.local)))
-        known = None
-        if course is not None and self._intervals is not None:
-            head = self._decided(batch, poses.slice(0, 1)) if lead else None
-            known = self._intervals.answer(frames, head, batch.ways, course)
-        return _Found(batch.columns, batch.rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
+        """Yield what is found of a batch's pairs in a block."""
+        rows, columns, ways, n = batch.rows, batch.columns, batch.ways, len(poses.local)
+        if course is None or self._intervals is None:
+            frames = self._decided(self.narrow_phase, batch, rows, poses)
+            yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, None)
+            return
+        middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
+        kinds = self._intervals.sorted_out(rows, middle, ways, course)
+        near = kinds == interval_proof.NEAR
+        if self._savings:
+            quiet = kinds == interval_proof.QUIET
+            if self._own is not None:  # what the other engine says of them at the frames is not known
+                near, quiet = near | quiet, np.zeros_like(quiet)
+            self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
+            yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(ways[quiet], course))
+            columns, rows, ways = columns[near], rows[near], ways[near]
+        shown, first = poses.slice(lead, n), poses.slice(0, 1)
+        frames = self._decided(self.narrow_phase, batch, rows, shown, ways, course)
+        head = self._decided(self.narrow_phase, batch, rows, first) if lead else None
+        told, before = frames, head
+        if self._own is not None:
+            told = frames._replace(clearance=self._decided(self._own, batch, rows, shown).clearance)
+            if head is not None:
+                before = head._replace(clearance=self._decided(self._own, batch, rows, first).clearance)
+        known = self._intervals.answer(told, before, ways, course)
+        if not self._savings:  # as it is told where these are not looked at
+            known.bound[(known.between == Between.CLEAR) & (kinds == interval_proof.FAR)] = self._cap
+        yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
 
-    def _decided(self, batch: _Batch, poses: LinkPoses) -> PairFrames:
-        """Return what is found of a batch's pairs in frames."""
-        relative = batch.relative.of(poses.local)
+    def _clear(self, columns: Integers, rows: Integers, bound: Floats) -> _Found:
+        """Return what is found of pairs that are clear in all of a block, with bounds (m, c) of its intervals."""
+        shape = 1, len(columns)
+        return _Found(
+            columns,
+            rows[:, :2],
+            np.zeros(shape, dtype=np.uint8),
+            np.full(shape, np.nan),
+            np.zeros(shape, dtype=bool),
+            Known(np.full(shape, Between.CLEAR, dtype=np.uint8), bound, Crossings.none()),
+        )
+
+    def _decided(
+        self,
+        engine: NarrowPhase,
+        batch: _Batch,
+        rows: Integers,
+        poses: LinkPoses,
+        ways: Integers | None = None,
+        course: Course | None = None,
+    ) -> PairFrames:
+        """Return what an engine finds of some of a batch's pairs in frames; by their ways if the course is known."""
+        wanted = np.zeros(batch.relative.count, dtype=bool)
+        wanted[rows[:, 2]] = True
+        relative = batch.relative.of(poses.local, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self._uses_world:
             turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
-        frames = unanswered(batch.rows, relative, turns)
+        frames = unanswered(rows, relative, turns)
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
         limit = self._limit
-        if self._savings:
+        if self._savings and ways is not None and course is not None and not self._uses_world and self._own is None:
+            way_sieve.sieve_by_way(
+                self._bodies,
+                self._volumes,
+                frames,
+                course.begin,
+                ways,
+                course.ways,
+                course.rounding,
+                limit,
+                sieved,
+                scratch,
+                np.empty((3, 3)),
+                np.empty(3),
+            )
+        elif self._savings:
             broad.sieve(self._volumes, frames, limit, sieved, spreads, scratch)
         else:
             broad.keep_all(self._volumes, frames, scratch)
             limit = math.inf if limit > 0.0 else 0.0
-        self.narrow_phase(frames, limit, decided)
+        engine(frames, limit, decided)
         if not self._savings:
             frames.clearance[frames.clearance > self._limit] = np.nan
         self.counters.add(sieved.tolist(), decided.tolist())

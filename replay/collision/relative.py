@@ -7,10 +7,10 @@ way k is its parent's way times the link's own pose. A pair then costs one inver
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64
+from numba import boolean, float64, int64
 
 from replay.kinematics.linkage import Linkage
-from replay.numerics.arrays import Floats, Integers
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
 
@@ -51,11 +51,26 @@ class RelativePoses:
         self._ways = np.stack([_rows(parents, keys, order), keys % count], axis=1)
         self._pairs = np.ascontiguousarray(_rows(wanted, keys, order))
 
-    def of(self, local: Floats) -> Floats:
-        """Return T_a_b (Q, n, 4, 4) of the Q link pairs, for link poses local (n, L, 4, 4) in their parents."""
+    @property
+    def count(self) -> int:
+        """How many link pairs there are."""
+        return len(self._pairs)
+
+    def of(self, local: Floats, wanted: Flags | None = None) -> Floats:
+        """Return T_a_b (Q, n, 4, 4) of the Q link pairs.
+
+        Args:
+            local: (n, L, 4, 4) link poses in their parents.
+            wanted: (Q,) the link pairs that are asked for, all if None; what is returned of others means nothing.
+        """
         n = len(local)
+        wanted = np.ones(len(self._pairs), dtype=bool) if wanted is None else wanted
         table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(self._pairs), n, 4, 4))
-        _relative(np.ascontiguousarray(local), self._ways, self._pairs, table, np.identity(4), np.identity(4), result)
+        needed = np.zeros(len(self._ways), dtype=bool)
+        ends = self._pairs[wanted].ravel()
+        needed[ends[ends >= 0]] = True
+        local, one = np.ascontiguousarray(local), np.identity(4)
+        _relative(local, self._ways, self._pairs, needed, wanted, table, one, one.copy(), result)
         return result
 
 
@@ -71,6 +86,8 @@ def _rows(wanted: Integers, keys: Integers, order: Integers) -> Integers:
     float64[:, :, :, ::1],
     int64[:, ::1],
     int64[:, ::1],
+    boolean[::1],
+    boolean[::1],
     float64[:, :, :, ::1],
     float64[:, ::1],
     float64[:, ::1],
@@ -78,17 +95,28 @@ def _rows(wanted: Integers, keys: Integers, order: Integers) -> Integers:
 )
 @leaf_kernel
 def _relative(
-    local: Floats, ways: Integers, pairs: Integers, table: Floats, identity: Floats, inverse: Floats, result: Floats
+    local: Floats,
+    ways: Integers,
+    pairs: Integers,
+    needed: Flags,
+    wanted: Flags,
+    table: Floats,
+    identity: Floats,
+    inverse: Floats,
+    result: Floats,
 ) -> None:
     """Fill result (Q, n, 4, 4); `table` (ways, n, 4, 4) and `inverse` (4, 4), an identity at first, are scratch."""
     n = local.shape[0]
+    for k in range(len(ways) - 1, -1, -1):
+        if needed[k] and ways[k, 0] >= 0:
+            needed[ways[k, 0]] = True
     for k in range(len(ways)):
         parent, link = ways[k, 0], ways[k, 1]
-        for f in range(n):
+        for f in range(n if needed[k] else 0):
             _compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
     for q in range(len(pairs)):
         a, b = pairs[q, 0], pairs[q, 1]
-        for f in range(n):
+        for f in range(n if wanted[q] else 0):
             up = identity if a < 0 else table[a, f]
             for i in range(3):
                 for j in range(3):

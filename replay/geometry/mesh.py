@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +29,13 @@ from replay.numerics.rows import distinct_rows
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
 
 
-def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> Solid:
+def load_mesh(path: Path | str, *, scale: float | Sequence[float], data: bytes | None = None) -> Solid:
     """Return the body in a mesh file, its coordinates multiplied by scale.
 
     Args:
         path: an STL, OBJ, PLY or GLB file; a GLB's scene is flattened into one body, each part in its place.
-        scale: metres per unit of the file: 0.01 for centimetres.
+        scale: metres per unit of the file: 0.01 for centimetres; or three numbers along x, y and z, of which a negative
+            one mirrors the mesh and turns its triangles over.
         data: the file's content when it has been read already; then the path names the format, and errors.
 
     Returns:
@@ -42,10 +44,9 @@ def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> S
 
     Raises:
         MeshError: unreadable or of another format, empty, not finite, without any triangle that has an area.
-        InvalidValue: a scale that is not finite and positive.
+        InvalidValue: a scale that is not finite and positive, or along an axis not finite or 0.
     """
-    if not 0.0 < scale < math.inf:
-        raise InvalidValue("scale", scale, "must be finite and positive [m per unit of the file]")
+    scales = _along_axes(scale)
     name = str(path)
     vertices, faces = read_faces(path, data)
     if len(faces) == 0:
@@ -57,13 +58,26 @@ def load_mesh(path: Path | str, *, scale: float, data: bytes | None = None) -> S
     if bad:
         raise MeshError(name, f"{bad} of {len(faces)} triangles have a corner that is not finite")
     with np.errstate(over="ignore", under="ignore"):
-        triangles = vertices[faces] * scale
+        triangles = vertices[faces] * scales
+    if np.prod(np.sign(scales)) < 0.0:
+        triangles = triangles[:, [0, 2, 1]]
     if np.max(np.abs(triangles)) > _LARGEST:
         raise MeshError(name, f"coordinates times scale = {scale} reach beyond {_LARGEST} m")
     try:
         return solid_from_triangles(triangles)
     except InvalidValue as error:
         raise MeshError(name, error.rule) from error
+
+
+def _along_axes(scale: float | Sequence[float]) -> Floats:
+    scales = np.atleast_1d(np.asarray(scale, dtype=np.float64))
+    if scales.shape == (1,):
+        if not 0.0 < scales[0] < math.inf:
+            raise InvalidValue("scale", scale, "must be finite and positive [m per unit of the file]")
+        return np.repeat(scales, 3)
+    if scales.shape != (3,) or not np.isfinite(scales).all() or not scales.all():
+        raise InvalidValue("scale", scale, "must be one or three finite numbers, not 0 [m per unit of the file]")
+    return scales
 
 
 def solid_from_triangles(triangles: Floats) -> Solid:

@@ -6,6 +6,7 @@ most, which fixes the number of segments: the tessellation is never further from
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -62,7 +63,7 @@ def sphere(radius: float, chord_error: float) -> Solid:
     while _deepest(_sphere_face(_ICOSAHEDRON[0], splits)) > relative:
         splits += 1
     _check_count("chord_error", chord_error, 20 * splits * splits)
-    triangles = radius * np.concatenate([_sphere_face(face, splits) for face in _ICOSAHEDRON])
+    triangles = radius * _unit_sphere(splits)
     error = radius * _deepest(_sphere_face(_ICOSAHEDRON[0], splits))
     return Solid(triangles, pieces=(_distinct(triangles),), chord_error=error)
 
@@ -91,6 +92,47 @@ def cone(radius: float, height: float, chord_error: float) -> Solid:
     apex[:, 2], centre[:, 2] = 0.5 * height, -0.5 * height
     triangles = np.concatenate([np.stack([base, following, apex], axis=1), np.stack([centre, following, base], axis=1)])
     return Solid(triangles, pieces=(np.concatenate([base, apex[:1]]),), chord_error=error)
+
+
+def capsule(radius: float, height: float, chord_error: float) -> Solid:
+    """Return a cylinder [m] along z between two half spheres, centred on the origin; height is the cylinder's part.
+
+    The half spheres have rings of corners, of which the fewest are taken that keep every facet's plane within
+    chord_error [m] of the sphere. Rings are parallel, so that what lies between two of them is plane facets, and what
+    all triangles enclose is the hull of their corners.
+    """
+    _positive("radius", radius)
+    _positive("height", height)
+    count = _segments(radius, FULL_TURN, chord_error)
+    _check_count("chord_error", chord_error, 2.0 * count * count)  # a facet is twice as deep as a chord
+    while radius * _deepest(cap := _half_sphere(count)) > chord_error:
+        count += 1
+    top = radius * cap
+    bottom = top[:, ::-1] * (1.0, 1.0, -1.0)
+    rim, _ = _polygon(radius, count)
+    low, high = (np.column_stack([rim, np.full(count, z)]) for z in (-0.5 * height, 0.5 * height))
+    sides = _quads(np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1))
+    raised = np.array([0.0, 0.0, 0.5 * height])
+    triangles = np.concatenate([top + raised, sides, bottom - raised])
+    return Solid(triangles, pieces=(_distinct(triangles),), chord_error=radius * _deepest(cap))
+
+
+def ellipsoid(radii: Sequence[float], chord_error: float) -> Solid:
+    """Return an ellipsoid of half axes radii (3,) [m] about the origin: a sphere's triangles, stretched.
+
+    Stretching by S = diag(radii) takes a facet of unit normal n at distance 1 - d from the centre of the unit sphere to
+    one whose plane is d / |S^-1 n| below the parallel plane that touches the ellipsoid. The fewest splits of a
+    `sphere` are taken that keep this within chord_error [m] for every facet.
+    """
+    scale = np.array([_positive(f"radii[{k}]", value) for k, value in enumerate(_numbers("radii", radii, 3))])
+    _positive("chord_error", chord_error)
+    relative = min(chord_error / float(np.max(scale)), 1.0)
+    splits = max(1, int(0.5 * math.sqrt(1.0 / relative)))
+    _check_count("chord_error", chord_error, 20 * splits * splits)
+    while (error := _deepest(unit := _unit_sphere(splits), scale)) > chord_error:
+        splits += 1
+    triangles = unit * scale
+    return Solid(triangles, pieces=(_distinct(triangles),), chord_error=error)
 
 
 def arc(radius: float, span: float, width: float, thickness: float, chord_error: float) -> Solid:
@@ -156,10 +198,31 @@ def _segments(radius: float, span: float, chord_error: float) -> int:
 def _circle(radius: float, chord_error: float) -> tuple[Floats, float]:
     """Return the corners (n, 2) of the polygon, counter-clockwise, and its sagitta."""
     _positive("radius", radius)
-    count = _segments(radius, FULL_TURN, chord_error)
+    return _polygon(radius, _segments(radius, FULL_TURN, chord_error))
+
+
+def _polygon(radius: float, count: int) -> tuple[Floats, float]:
+    """Return the corners (count, 2) of a regular polygon, counter-clockwise, and its sagitta."""
     angles = [FULL_TURN * k / count for k in range(count)]
     rim = np.array([[radius * math.cos(angle), radius * math.sin(angle)] for angle in angles])
     return rim, _sagitta(radius, math.pi / count)
+
+
+def _half_sphere(count: int) -> Floats:
+    """Return the upper half (n, 3, 3) of the unit sphere: rings of `count` corners, a quarter as many from the pole."""
+    rings = -(-count // 4)
+    rim, _ = _polygon(1.0, count)
+    angles = [0.25 * FULL_TURN * k / rings for k in range(1, rings)]  # from the pole
+    heights = [*((math.sin(angle), math.cos(angle)) for angle in angles), (1.0, 0.0)]
+    circles = [np.column_stack([wide * rim, np.full(count, high)]) for wide, high in heights]
+    pole = np.zeros((count, 3))
+    pole[:, 2] = 1.0
+    fan = np.stack([pole, circles[0], np.roll(circles[0], -1, axis=0)], axis=1)
+    bands = [
+        _quads(np.stack([below, np.roll(below, -1, axis=0), np.roll(above, -1, axis=0), above], axis=1))
+        for above, below in itertools.pairwise(circles)
+    ]
+    return np.concatenate([fan, *bands])
 
 
 def _icosahedron() -> Floats:
@@ -204,11 +267,18 @@ def _sphere_face(face: Floats, splits: int) -> Floats:
     return np.concatenate([upward, downward])
 
 
-def _deepest(triangles: Floats) -> float:
-    """Return the largest depth of triangles inscribed in the unit sphere below it."""
+def _unit_sphere(splits: int) -> Floats:
+    return np.concatenate([_sphere_face(face, splits) for face in _ICOSAHEDRON])
+
+
+def _deepest(triangles: Floats, scale: Floats | None = None) -> float:
+    """Return the largest depth of triangles inscribed in the unit sphere below it, or once both are stretched."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
-    return float(np.max(1.0 - np.sum(normal * a, axis=1) / np.sqrt(np.sum(normal * normal, axis=1))))
+    depth = 1.0 - np.sum(normal * a, axis=1) / np.sqrt(np.sum(normal * normal, axis=1))
+    if scale is not None:
+        depth = depth * np.sqrt(np.sum(normal * normal, axis=1) / np.sum((normal / scale) ** 2, axis=1))
+    return float(np.max(depth))
 
 
 def _quads(corners: Floats) -> Floats:

@@ -44,6 +44,15 @@ class JointType(enum.Enum):
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """That a joint follows another: position = multiplier * position of `joint` + offset; units by the two's types."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class Joint:
     """What connects a link to its parent; limits in rad or m, per s and per s^2.
 
@@ -53,7 +62,9 @@ class Joint:
         axis: unit vector in the joint's frame; turned about or moved along.
         lower, upper: position limits.
         velocity, acceleration: limits on the absolute value.
-        initial: position while no script moves the joint.
+        initial: position while no script moves the joint; of one that follows, its leader's decides.
+        deceleration: limit on the absolute acceleration while the joint slows down; None: `acceleration`.
+        mimic: the joint that this one follows, or None.
     """
 
     name: str
@@ -64,6 +75,13 @@ class Joint:
     velocity: float = np.inf
     acceleration: float = np.inf
     initial: float = 0.0
+    deceleration: float | None = None
+    mimic: Mimic | None = None
+
+    @property
+    def braking(self) -> float:
+        """The limit of the deceleration."""
+        return self.acceleration if self.deceleration is None else self.deceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +156,12 @@ class Linkage:
         parents: (L,) int64, index of the parent link, -1 for the root of a tree.
         joints: the J scalar joints (revolute, continuous, prismatic), sorted by name; `joint_names` their names.
         free_joints: the K free joints, sorted by name; `free_names` their names.
+        followers: of each joint that follows another, by name: the joint that no other moves at the end of the chain,
+            and multiplier and offset of the whole chain.
+
+    Raises:
+        InvalidValue: a name is there twice, a parent or a joint that is followed is not there, links or joints are
+            their own ancestors or leaders.
     """
 
     def __init__(self, links: Sequence[Link]) -> None:
@@ -157,6 +181,7 @@ class Linkage:
         self.free_names = tuple(joint.name for joint in self.free_joints)
         if len({*self.joint_names, *self.free_names}) != len(self.joints) + len(self.free_joints):
             raise InvalidValue("joints", [*self.joint_names, *self.free_names], "joint names must be unique")
+        self.followers = _followers(self.joints)
         self._order = self._parents_first()
         self._index = index
 
@@ -187,6 +212,28 @@ class Linkage:
     def are_adjacent(self, a: int, b: int) -> bool:
         """Return whether links a and b are joined by a joint."""
         return bool(self.parents[a] == b or self.parents[b] == a)
+
+    def followed(self, positions: Floats) -> Floats:
+        """Return joint positions (n, J) [rad or m] with those of joints that follow another put in their place."""
+        result = positions.copy()
+        for name, mimic in self.followers.items():
+            leader = positions[:, self.joint_names.index(mimic.joint)]
+            result[:, self.joint_names.index(name)] = mimic.multiplier * leader + mimic.offset
+        return result
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return from where to where each joint that leads itself may go [rad or m]: its limits, and its followers'.
+
+        There is no such position where the first number is above the second.
+        """
+        found = {joint.name: (joint.lower, joint.upper) for joint in self.joints if joint.name not in self.followers}
+        for joint in self.joints:
+            mimic = self.followers.get(joint.name)
+            if mimic is not None and mimic.multiplier != 0.0:
+                ends = sorted((bound - mimic.offset) / mimic.multiplier for bound in (joint.lower, joint.upper))
+                lower, upper = found[mimic.joint]
+                found[mimic.joint] = (max(lower, ends[0]), min(upper, ends[1]))
+        return found
 
     def forward(self, positions: Floats, free_poses: Floats) -> LinkPoses:
         """Return the poses of all links.
@@ -230,3 +277,24 @@ class Linkage:
             names = [self.link_names[k] for k in sorted(set(range(len(self.links))) - set(order))]
             raise InvalidValue("links", names, "these links are their own ancestors; the parents must form trees")
         return order
+
+
+def _followers(joints: Sequence[Joint]) -> dict[str, Mimic]:
+    """Return what each joint that mimics follows in the end."""
+    known = {joint.name: joint for joint in joints}
+    found: dict[str, Mimic] = {}
+    for joint in joints:
+        chain, mimic = [joint.name], joint.mimic
+        multiplier, offset = 1.0, 0.0
+        while mimic is not None:
+            if mimic.joint not in known:
+                rule = f"must be one of the joints with a position: {sorted(known)}"
+                raise InvalidValue(f"joints.{chain[-1]}.mimic.joint", mimic.joint, rule)
+            multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
+            if mimic.joint in chain:
+                raise InvalidValue(f"joints.{joint.name}.mimic", chain, "these joints follow each other in a circle")
+            chain.append(mimic.joint)
+            mimic = known[mimic.joint].mimic
+        if len(chain) > 1:
+            found[joint.name] = Mimic(chain[-1], multiplier, offset)
+    return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from replay.errors import InvalidValue, MotionLimitError
-from replay.kinematics.linkage import Joint, Linkage
+from replay.kinematics.linkage import Joint, Linkage, Mimic
 from replay.kinematics.profiles import (
     Profile,
     Waypoint,
@@ -91,10 +91,11 @@ class Script:
     recorded: Mapping[str, Track] = field(default_factory=dict)
     recorded_free: Mapping[str, FreeTrack] = field(default_factory=dict)
 
-    def tolerance(self, joint: str) -> float:
-        """Return how far a joint may be beyond its position limits [rad or m]."""
-        track = self.recorded.get(joint)
-        return track.tolerance if track is not None else 0.0
+    def tolerance(self, joint: str, followers: Mapping[str, Mimic]) -> float:
+        """Return how far a joint may be beyond its position limits [rad or m]; of a follower by its leader."""
+        mimic = followers.get(joint, Mimic(joint))
+        track = self.recorded.get(mimic.joint)
+        return abs(mimic.multiplier) * track.tolerance if track is not None else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +156,7 @@ def plan(linkage: Linkage, script: Script) -> Motion:
     """
     profiles = joint_profiles(linkage, script)
     for joint in linkage.joints:
-        check_limits(joint, profiles[joint.name], script.tolerance(joint.name))
+        check_limits(joint, profiles[joint.name], script.tolerance(joint.name, linkage.followers))
     paths = {name: FreePath.through(name, keyframes) for name, keyframes in script.free.items()}
     paths |= {name: FreePath.along(name, track) for name, track in script.recorded_free.items()}
     return Motion(tuple(profiles[joint.name] for joint in linkage.joints), tuple(map(paths.get, linkage.free_names)))
@@ -183,10 +184,16 @@ def joint_profiles(linkage: Linkage, script: Script) -> dict[str, Profile]:
         raise InvalidValue("motion.moves", repr(name), "is moved by motion.points as well; keep one of the two")
     for name in sorted(set(script.recorded) & (moved | set(script.points))):
         raise InvalidValue("motion.recorded", repr(name), "is moved by motion.points or moves as well; keep one")
+    for name in sorted((moved | set(script.points) | set(script.recorded)) & linkage.followers.keys()):
+        leader = linkage.followers[name].joint
+        raise InvalidValue("motion", repr(name), f"follows joint {leader!r}, which alone moves it; move that one")
     profiles = {name: from_pieces([], joint.initial, joint.initial) for name, joint in joints.items()}
     profiles |= {name: through_waypoints(name, points) for name, points in script.points.items()}
     profiles |= {name: through_samples(track.seconds, track.positions) for name, track in script.recorded.items()}
-    return profiles | _planned(joints, script.moves)
+    profiles |= _planned(joints, script.moves)
+    for name, mimic in linkage.followers.items():
+        profiles[name] = profiles[mimic.joint].scaled(mimic.multiplier, mimic.offset)
+    return profiles
 
 
 def check_limits(joint: Joint, profile: Profile, tolerance: float = 0.0) -> None:
@@ -198,15 +205,21 @@ def check_limits(joint: Joint, profile: Profile, tolerance: float = 0.0) -> None
         tolerance: how far positions may be beyond [rad or m].
     """
     unit = joint.type.unit
-    limits = (
-        (0, "position", joint.lower, joint.upper, unit),
-        (1, "velocity", -joint.velocity, joint.velocity, f"{unit}/s"),
-        (2, "acceleration", -joint.acceleration, joint.acceleration, f"{unit}/s^2"),
-    )
-    for derivative, quantity, lower, upper, unit in limits:
+    faster, slower = joint.acceleration, joint.braking
+    limits = [
+        (profile, 0, "position", joint.lower, joint.upper, unit),
+        (profile, 1, "velocity", -joint.velocity, joint.velocity, f"{unit}/s"),
+    ]
+    if faster == slower:
+        limits.append((profile, 2, "acceleration", -faster, faster, f"{unit}/s^2"))
+    else:  # against the velocity it is a deceleration
+        rising, falling = profile.by_direction()
+        limits.append((rising, 2, "acceleration", -slower, faster, f"{unit}/s^2"))
+        limits.append((falling, 2, "acceleration", -faster, slower, f"{unit}/s^2"))
+    for part, derivative, quantity, lower, upper, unit in limits:
         if math.isinf(lower) and math.isinf(upper):
             continue
-        candidates = profile.extremes(derivative)
+        candidates = part.extremes(derivative)
         if not candidates:
             continue
         size = max(abs(bound) for bound in (lower, upper) if math.isfinite(bound))
@@ -238,21 +251,26 @@ def _planned(joints: Mapping[str, Joint], moves: tuple[Move, ...]) -> dict[str, 
             if start < free_from.get(name, 0.0):
                 rule = f"joint {name!r} is still moving until {free_from[name]:.6g} s; start then or later"
                 raise InvalidValue(f"{place}.start", f"{start:.6g} s", rule)
-            for limit in ("velocity", "acceleration"):
-                value = getattr(joint, limit)
+            rates = {"velocity": joint.velocity, "acceleration": joint.acceleration, "deceleration": joint.braking}
+            for limit, value in rates.items():
                 if not (0.0 < value < math.inf):
                     rule = f"a move needs a finite {limit} limit above 0 on joint {name!r}; give it one, or use points"
                     raise InvalidValue(f"{place}.to.{name}", f"{limit} limit {value}", rule)
         origins = {name: position.get(name, joints[name].initial) for name in names}
-        planned = {name: (joints[name].velocity * move.speed, joints[name].acceleration * move.speed) for name in names}
+        planned = {
+            name: tuple(limit * move.speed for limit in (joint.velocity, joint.acceleration, joint.braking))
+            for name, joint in ((name, joints[name]) for name in names)
+        }
         times = {name: trapezoid_time(abs(move.to[name] - origins[name]), *planned[name]) for name in names}
         slowest = max(times.values())
         for name in names:
-            velocity, acceleration = planned[name]
+            velocity, acceleration, braking = planned[name]
             if move.synchronised and 0.0 < times[name] < slowest:
                 stretch = times[name] / slowest  # a profile stretched in time keeps its shape and its limits
-                velocity, acceleration = velocity * stretch, acceleration * stretch * stretch
-            pieces.setdefault(name, []).extend(trapezoid(start, origins[name], move.to[name], velocity, acceleration))
+                velocity = velocity * stretch
+                acceleration, braking = (rate * stretch * stretch for rate in (acceleration, braking))
+            way = (origins[name], move.to[name])
+            pieces.setdefault(name, []).extend(trapezoid(start, *way, velocity, acceleration, braking))
             position[name] = move.to[name]
             free_from[name] = start + (slowest if move.synchronised else times[name])
     return {name: from_pieces(parts, joints[name].initial, position[name]) for name, parts in pieces.items()}

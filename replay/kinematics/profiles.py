@@ -73,6 +73,34 @@ class Profile:
         position = np.where(piece < 0, self.before, np.where(seconds >= self.end[-1], self.after, position))
         return position, np.where(resting, 0.0, velocity)
 
+    def scaled(self, multiplier: float, offset: float) -> Profile:
+        """Return the profile of a joint that follows this one: multiplier * position + offset."""
+        coefficients = multiplier * self.coefficients
+        coefficients[:, 0] += offset
+        before, after = multiplier * self.before + offset, multiplier * self.after + offset
+        return Profile(self.start, self.end, coefficients, before, after)
+
+    def by_direction(self) -> tuple[Profile, Profile]:
+        """Return the parts in which the position rises and those in which it falls, each as a profile.
+
+        Pieces are cut where the velocity changes its sign; where it is zero all along there is neither.
+        """
+        rising: list[list[float]] = []
+        falling: list[list[float]] = []
+        for start, end, row in zip(self.start.tolist(), self.end.tolist(), self.coefficients.tolist(), strict=True):
+            position = np.polynomial.Polynomial(row)
+            velocity = position.deriv()
+            roots = map(complex, velocity.trim().roots())
+            inner = (root.real for root in roots if abs(root.imag) <= 1e-9 * (1.0 + abs(root.real)))
+            cuts = [0.0, *sorted(tau for tau in inner if 0.0 < tau < end - start), end - start]
+            for a, b in itertools.pairwise(cuts):
+                moving = float(velocity(0.5 * (a + b)))
+                if moving != 0.0:
+                    shifted = position(np.polynomial.Polynomial([a, 1.0])).coef.tolist()
+                    coefficients = (shifted + [0.0] * 6)[:6]
+                    (rising if moving > 0.0 else falling).append([start + a, start + b, *coefficients])
+        return from_pieces(rising, self.before, self.after), from_pieces(falling, self.before, self.after)
+
     def extremes(self, derivative: int) -> list[tuple[float, float]]:
         """Return candidates (time, value) for the extremes of a derivative: piece ends and inner stationary points."""
         if not len(self.start):
@@ -158,35 +186,53 @@ def _hermite(a: Waypoint, b: Waypoint) -> list[float]:
     ]
 
 
-def trapezoid_time(distance: float, velocity: float, acceleration: float) -> float:
-    """Return the time [s] that a trapezoidal (short ways: triangular) velocity profile takes for a distance >= 0."""
-    if distance * acceleration <= velocity * velocity:
-        return 2.0 * math.sqrt(distance / acceleration)
-    return distance / velocity + velocity / acceleration
+def trapezoid_time(distance: float, velocity: float, acceleration: float, deceleration: float | None = None) -> float:
+    """Return the time [s] that a trapezoidal (short ways: triangular) velocity profile takes for a distance >= 0.
+
+    With the harmonic mean h of acceleration and deceleration, which is the acceleration itself if both are equal, the
+    top velocity is reached on ways above v^2 / h; these take d / v + v / h, shorter ones 2 sqrt(d / h).
+    """
+    mean = acceleration
+    if deceleration is not None and deceleration != acceleration:
+        mean = 2.0 / (1.0 / acceleration + 1.0 / deceleration)
+    if distance * mean <= velocity * velocity:
+        return 2.0 * math.sqrt(distance / mean)
+    return distance / velocity + velocity / mean
 
 
-def trapezoid(start: float, origin: float, target: float, velocity: float, acceleration: float) -> list[list[float]]:
+def trapezoid(
+    start: float,
+    origin: float,
+    target: float,
+    velocity: float,
+    acceleration: float,
+    deceleration: float | None = None,
+) -> list[list[float]]:
     """Return the pieces [start, end, c0..c5] of one move from rest to rest under its limits.
 
     Args:
         start: [s], when the move begins.
         origin, target: [rad or m].
         velocity, acceleration: limits, both > 0.
+        deceleration: limit while it slows down, > 0; `acceleration` when None.
     """
     distance = abs(target - origin)
     if distance == 0.0:
         return []
+    braking = acceleration if deceleration is None else deceleration
     sign = math.copysign(1.0, target - origin)
-    total = trapezoid_time(distance, velocity, acceleration)
-    ramp = min(velocity / acceleration, 0.5 * total)
-    peak = acceleration * ramp
-    rise = 0.5 * acceleration * ramp * ramp
-    a, v = sign * acceleration, sign * peak
+    total = trapezoid_time(distance, velocity, acceleration, braking)
+    speeding_up = braking / (acceleration + braking)  # share of the time, if the top velocity is not reached
+    ramp = min(velocity / acceleration, speeding_up * total)
+    brake = min(velocity / braking, (1.0 - speeding_up) * total)
+    rise, fall = 0.5 * acceleration * ramp * ramp, 0.5 * braking * brake * brake
+    a, d = sign * acceleration, sign * braking
     pieces = [[start, start + ramp, origin, 0.0, 0.5 * a, 0.0, 0.0, 0.0]]
-    cruise = total - 2.0 * ramp
+    cruise = total - (ramp + brake)
     if cruise > 0.0:
+        v = sign * acceleration * ramp
         pieces.append([start + ramp, start + ramp + cruise, origin + sign * rise, v, 0.0, 0.0, 0.0, 0.0])
-    pieces.append([start + total - ramp, start + total, target - sign * rise, v, -0.5 * a, 0.0, 0.0, 0.0])
+    pieces.append([start + total - brake, start + total, target - sign * fall, d * brake, -0.5 * d, 0.0, 0.0, 0.0])
     return pieces
 
 

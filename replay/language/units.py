@@ -304,6 +304,7 @@ Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1
 Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]
 Share = Annotated[float, Quantity("Share", NUMBER, at_least=1e-3, at_most=1.0)]
 Scale = Annotated[float, Quantity("Scale", NUMBER, at_least=1e-9, at_most=1e9)]
+AxisScale = Annotated[float, Quantity("AxisScale", NUMBER, at_least=-1e9, at_most=1e9)]
 
 JointPosition = Annotated[Dimensioned, AnyQuantity("JointPosition", (ANGLE, LENGTH))]
 LimitTolerance = Annotated[Dimensioned, AnyQuantity("LimitTolerance", (ANGLE, LENGTH), at_least=0.0)]

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import types
-from numba.core import config
+from numba import config, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 

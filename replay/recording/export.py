@@ -17,7 +17,6 @@ import numpy as np
 
 from replay import limits
 from replay.errors import InvalidValue, LimitError
-from replay.kinematics.linkage import WORLD
 from replay.language.globs import fits
 from replay.logs.mcap_reader import McapLog
 from replay.logs.part_file import write_file
@@ -26,6 +25,7 @@ from replay.numerics.arrays import Column
 from replay.numerics.columns import Field
 from replay.recording.provenance import RECORD
 from replay.recording.reader import Recording
+from replay.recording.topics import world_frame
 from replay.sensing.kinds import KINDS
 from replay.simulation import Layout
 
@@ -43,8 +43,9 @@ def tables(recording: Recording) -> dict[str, Table]:
     for joint, (name, unit) in enumerate(zip(layout.joints, layout.joint_units, strict=True)):
         result["/joint_states"][f"{name} position [{unit}]"] = recording.joint_positions[:, joint]
         result["/joint_states"][f"{name} velocity [{unit}/s]"] = recording.joint_velocities[:, joint]
+    world = world_frame(layout)
     for link, name in enumerate(layout.links):
-        place = f"{name} in {WORLD}"
+        place = f"{name} in {world}"
         _vector(result["/tf"], place, " [m]", recording.link_poses[:, link, :3, 3], "xyz")
         _vector(result["/tf"], f"{place} quat", "", recording.link_quaternions[:, link], "xyzw")
     if recording.collision is not None:

@@ -22,7 +22,7 @@ import replay
 from replay import limits
 from replay.errors import LimitError, RecordingError
 from replay.json_text import read_json, typed
-from replay.simulation import BLOCK_FRAMES, Layout
+from replay.simulation import BLOCK_FRAMES, Layout, block_frames
 
 FORMAT = 2
 """Version of the recording format that is written."""
@@ -181,6 +181,7 @@ def describe(
         code=code_identity(),
         version=replay.__version__,
         libraries=library_versions(),
+        block_frames=block_frames(len(layout.pairs)),
         originals=originals or {},
     )
 

@@ -13,7 +13,7 @@ from replay.recording.behind import WriteBehind, Writer
 from replay.recording.provenance import describe
 from replay.recording.scene_view import view
 from replay.recording.writer import McapWriter
-from replay.simulation import BLOCK_FRAMES, FrameBlock, Simulation
+from replay.simulation import FrameBlock, Simulation
 
 if TYPE_CHECKING:
     from replay.scenario.methods import Model
@@ -97,7 +97,7 @@ def record_blocks(
         writers.append(McapWriter(paths.mcap, provenance, shown, scenario.sources, overwrite=overwrite))
         if paths.rrd is not None:
             writers.insert(0, RerunWriter(paths.rrd, scene.layout, shown, overwrite=overwrite))
-        with WriteBehind(writers, threaded=scene.frames > BLOCK_FRAMES) as behind:
+        with WriteBehind(writers, threaded=scene.frames > provenance.block_frames) as behind:
             done = 0
             for block in blocks:
                 behind.put(block)

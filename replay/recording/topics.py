@@ -26,8 +26,6 @@ from replay.simulation import FrameBlock, Layout
 
 Columns = dict[str, Column]
 
-"""The coordinate frame that every link's transform starts from."""
-
 _WIDE_SECONDS = 1 << 34  # an example time stamp whose varints have five bytes: room for 2^35 s
 _WIDE_NANOS = 1 << 29
 _STAMP = {"seconds": _WIDE_SECONDS, "nanos": _WIDE_NANOS}
@@ -138,9 +136,18 @@ def _joints(block: FrameBlock) -> Columns:
     return columns
 
 
+def world_frame(layout: Layout) -> str:
+    """Return the frame that every link's transform starts from: "world", with a "_" more where a link is called so."""
+    name = WORLD
+    while name in layout.links:
+        name += "_"
+    return name
+
+
 def _transforms_example(layout: Layout) -> dict[str, Any]:
     ones = {"x": 1.0, "y": 1.0, "z": 1.0}
-    frames = ({"parent_frame_id": WORLD, "child_frame_id": name} for name in layout.links)
+    world = world_frame(layout)
+    frames = ({"parent_frame_id": world, "child_frame_id": name} for name in layout.links)
     return {
         "transforms": [
             {"timestamp": _STAMP, "translation": ones, "rotation": {**ones, "w": 1.0}, **frame} for frame in frames

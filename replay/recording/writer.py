@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from replay.errors import InvalidValue
-from replay.kinematics.linkage import WORLD
 from replay.logs.mcap_records import MAGIC
 from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.part_file import PartFile
@@ -60,8 +59,6 @@ class McapWriter:
             RecordingExistsError: it exists and may not be overwritten.
             WriteError: the file cannot be written.
         """
-        if WORLD in provenance.layout.links:
-            raise InvalidValue("links", WORLD, "no link may have the name of the frame that all links are placed in")
         self._provenance = provenance
         self._scene = scene
         self._files = files

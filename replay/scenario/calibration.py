@@ -49,7 +49,8 @@ class SensorPath:
     def __init__(self, scenario: Scenario, *, sensor: str | None = None, joint: str | None = None) -> None:
         scene = build(scenario)
         sensors = {found.name: found for found in scene.capacitive_sensors}
-        joints = {found.name: found for found in scene.linkage.joints}
+        machine = scene.linkage
+        joints = {found.name: found for found in machine.joints if found.name not in machine.followers}
         moved = {*scene.script.points, *(name for move in scene.script.moves for name in move.to)}
         self.scenario = scenario
         self.sensor = sensors[_only("sensor", sensor, sorted(sensors), sorted(sensors))]
@@ -75,6 +76,7 @@ class SensorPath:
         at = np.asarray(positions, dtype=np.float64)
         states = np.repeat(self._start.positions, len(at), axis=0)
         states[:, self._linkage.joint_names.index(self.joint.name)] = at
+        states = self._linkage.followed(states)
         poses = self._linkage.forward(states, np.repeat(self._start.free_poses, len(at), axis=0))
         columns = self._suite.run(poses)
         found: Floats = columns.capacitance[:, self._column]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from replay.kinematics.linkage import WORLD
 from replay.language.units import (
     ACCELERATION,
     ANGLE,
@@ -38,11 +37,10 @@ def _links(names: Names) -> Iterator[Finding]:
     if not names.parents and (written is None or isinstance(written.value, dict)):
         yield ("links",), "must hold at least one link"
     for link, parent in names.parents.items():
-        if link == WORLD:
-            yield ("links", link), "must have another name: 'world' is the frame that all links stand in"
         if parent is not None and parent not in names.parents:
             yield ("links", link, "parent"), f"is no link; {did_you_mean(parent, names.parents, what='links are')}"
     yield from _circles(names.parents)
+    yield from _mimics(names)
     first: dict[str, JointName] = {}
     for joint in names.joints:
         if joint.type == "fixed":
@@ -51,6 +49,34 @@ def _links(names: Names) -> Iterator[Finding]:
         if other is not joint:
             where = ("links", joint.link, "joint", "name")
             yield where, f"names this joint {joint.name!r} like that of link {other.link!r}; joint names are unique"
+
+
+def _mimics(names: Names) -> Iterator[Finding]:
+    """Find joints that follow none, one that has no position, or themselves."""
+    joints = {joint.name: joint for joint in names.joints if joint.type != "fixed"}
+    follows = {name: joint.scalar.mimic for name, joint in joints.items() if joint.scalar is not None}
+    settled: set[str] = set()
+    for name, mimic in follows.items():
+        if mimic is None:
+            continue
+        path: Path = ("links", joints[name].link, "joint", "mimic")
+        if mimic.joint in joints and joints[mimic.joint].type == "free":
+            yield (*path, "joint"), "is a free joint, which has no position that could be followed"
+        else:
+            yield from _scalar_joint((*path, "joint"), joints, mimic.joint)
+        wrong = _wrong_dimension(mimic.offset, _dimension(joints[name]), joints[name])
+        if wrong is not None:
+            yield (*path, "offset"), wrong
+        chain: dict[str, None] = {}
+        above: str | None = name
+        while above is not None and above not in settled and above not in chain:
+            chain[above] = None
+            leader = follows.get(above)
+            above = None if leader is None else leader.joint
+        settled.update(chain)
+        if above is not None and above in chain:
+            circle = " -> ".join([*list(chain)[list(chain).index(above) :][:10], above])
+            yield (*path, "joint"), f"makes a circle: {circle}; one of these must lead"
 
 
 def _circles(parents: dict[str, str | None]) -> Iterator[Finding]:
@@ -73,22 +99,36 @@ def _motion(names: Names) -> Iterator[Finding]:
     joints = {joint.name: joint for joint in names.joints if joint.type != "fixed"}
     for name, waypoints in names.points.items():
         path: Path = ("motion", "points", name)
-        yield from _scalar_joint(path, joints, name)
+        yield from _moved_joint(path, joints, name)
         joint = joints.get(name)
         for index, point in enumerate(waypoints or ()):
             if joint is not None:
                 yield from _position((*path, index, "position"), point.position, joint)
                 yield from _rate((*path, index, "velocity"), point.velocity, joint, "velocity")
                 yield from _rate((*path, index, "acceleration"), point.acceleration, joint, "acceleration")
-    for index, move in enumerate(names.moves):
-        for name, target in (move.to if move is not None else {}).items():
-            path = ("motion", "moves", index, "to", name)
-            yield from _scalar_joint(path, joints, name)
+    for pose, positions in names.poses.items():
+        for name, position in (positions or {}).items():
+            path = ("poses", pose, name)
+            yield from _moved_joint(path, joints, name)
             if name in joints:
-                yield from _position(path, target, joints[name])
-                yield from _has_limits(path, joints[name])
-            if name in names.points:
-                yield path, "is a joint that motion.points moves as well; keep one of the two"
+                yield from _position(path, position, joints[name])
+    if names.initial is not None and names.initial not in names.poses:
+        yield ("motion", "initial"), f"is no pose; {did_you_mean(names.initial, names.poses, what='poses are')}"
+    for index, move in enumerate(names.moves):
+        target = {} if move is None else move.to
+        if isinstance(target, str):
+            path = ("motion", "moves", index, "to")
+            if target not in names.poses:
+                yield path, f"is no pose; {did_you_mean(target, names.poses, what='poses are')}"
+            for name in names.poses.get(target) or {}:
+                yield from _in_a_move(path, joints, names, name, f"moves joint {name!r}, which ")
+            continue
+        for name, position in target.items():
+            path = ("motion", "moves", index, "to", name)
+            yield from _moved_joint(path, joints, name)
+            if name in joints:
+                yield from _position(path, position, joints[name])
+            yield from _in_a_move(path, joints, names, name, "")
     free = [joint.name for joint in joints.values() if joint.type == "free"]
     for name in names.free:
         path = ("motion", "free", name)
@@ -99,6 +139,22 @@ def _motion(names: Names) -> Iterator[Finding]:
                 path,
                 f"is a {joints[name].type} joint; motion.free moves free joints, motion.points and moves this one",
             )
+
+
+def _in_a_move(path: Path, joints: dict[str, JointName], names: Names, name: str, subject: str) -> Iterator[Finding]:
+    """Find what keeps a joint from being moved by a move; `subject` goes before what is said of it."""
+    if name in joints:
+        yield from _has_limits(path, joints[name], subject)
+    if name in names.points:
+        yield path, f"{subject}is a joint that motion.points moves as well; keep one of the two"
+
+
+def _moved_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
+    yield from _scalar_joint(path, joints, name)
+    joint = joints.get(name)
+    if joint is not None and joint.scalar is not None and joint.scalar.mimic is not None:
+        leader = joint.scalar.mimic.joint
+        yield path, f"is a joint that follows {leader!r}, which alone moves it; name the joint that leads"
 
 
 def _scalar_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
@@ -112,7 +168,7 @@ def _scalar_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterat
 def _position(path: Path, position: Dimensioned, joint: JointName) -> Iterator[Finding]:
     if joint.type not in SCALAR_JOINTS:
         return
-    expected = LENGTH if joint.type == "prismatic" else ANGLE
+    expected = _dimension(joint)
     wrong = _wrong_dimension(position, expected, joint)
     if wrong is not None:
         yield path, wrong
@@ -137,6 +193,10 @@ def _rate(path: Path, rate: Dimensioned | None, joint: JointName, limit: str) ->
         yield path, f"is beyond the {limit} limit {most:.6g} {expected.si} of joint {joint.name!r}"
 
 
+def _dimension(joint: JointName) -> Dimension:
+    return LENGTH if joint.type == "prismatic" else ANGLE
+
+
 def _wrong_dimension(value: Dimensioned, expected: Dimension, joint: JointName) -> str | None:
     if value.dimension in (None, expected):
         return None
@@ -145,13 +205,13 @@ def _wrong_dimension(value: Dimensioned, expected: Dimension, joint: JointName) 
     return f"is {value.dimension.name} where {expected.name} belongs ({moves}); {expected.what_works}"
 
 
-def _has_limits(path: Path, joint: JointName) -> Iterator[Finding]:
-    if joint.scalar is None:
+def _has_limits(path: Path, joint: JointName, subject: str) -> Iterator[Finding]:
+    if joint.scalar is None or joint.scalar.mimic is not None:
         return
     missing = [limit for limit in ("velocity", "acceleration") if getattr(joint.scalar, limit) == float("inf")]
     if missing:
         what = " and ".join(missing)
-        yield path, f"needs a finite {what} limit on joint {joint.name!r}; give it one, or use motion.points"
+        yield path, f"{subject}needs a finite {what} limit on joint {joint.name!r}; give it one, or use motion.points"
 
 
 def _sensors(names: Names) -> Iterator[Finding]:

@@ -12,12 +12,15 @@ from replay.language.units import (
     ANGLE,
     LENGTH,
     Angle,
+    Dimensioned,
     Earth,
+    JointPosition,
     Length,
     MaxAcceleration,
     MaxAngularAcceleration,
     MaxAngularVelocity,
     MaxVelocity,
+    Number,
     Quantity,
 )
 from replay.scenario.shapes import Shape
@@ -31,6 +34,17 @@ class JointPart(Part):
 
     name: Name | None = None
     """Unique among all joints; the link's name when left out."""
+
+
+class MimicPart(Part):
+    """The joint that another one follows: position = multiplier * position of `joint` + offset."""
+
+    joint: Name
+    """The joint that leads; it may follow another one itself."""
+    multiplier: Number = 1.0
+    """How far this joint goes by how far the leader goes; between an angle and a length in rad/m or m/rad."""
+    offset: JointPosition = Dimensioned(0.0, None)
+    """Position [rad or m] of this joint where that of the leader is 0."""
 
 
 class FixedPart(JointPart):
@@ -59,12 +73,18 @@ class RevolutePart(JointPart):
     """Limit of the absolute velocity [rad/s]; moves need one."""
     acceleration: MaxAngularAcceleration = math.inf
     """Limit of the absolute acceleration [rad/s^2]; moves need one."""
-    initial: Angle = 0.0
-    """Position [rad] while nothing has moved the joint."""
+    deceleration: MaxAngularAcceleration | None = None
+    """Limit of the absolute acceleration while the joint slows down [rad/s^2]; `acceleration` when left out."""
+    initial: Angle | None = None
+    """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
+    nearest to 0."""
+    mimic: MimicPart | None = None
+    """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
-    def _initial_within_limits(self) -> Self:
+    def _sensible(self) -> Self:
         _check_limits(self, "rad")
+        _check_initial(self)
         return self
 
 
@@ -78,8 +98,18 @@ class ContinuousPart(JointPart):
     """Limit of the absolute velocity [rad/s]; moves need one."""
     acceleration: MaxAngularAcceleration = math.inf
     """Limit of the absolute acceleration [rad/s^2]; moves need one."""
-    initial: Angle = 0.0
-    """Position [rad] while nothing has moved the joint."""
+    deceleration: MaxAngularAcceleration | None = None
+    """Limit of the absolute acceleration while the joint slows down [rad/s^2]; `acceleration` when left out."""
+    initial: Angle | None = None
+    """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
+    nearest to 0."""
+    mimic: MimicPart | None = None
+    """The joint that this one follows; nothing else moves it then."""
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        _check_initial(self)
+        return self
 
 
 class PrismaticPart(JointPart):
@@ -96,22 +126,33 @@ class PrismaticPart(JointPart):
     """Limit of the absolute velocity [m/s]; moves need one."""
     acceleration: MaxAcceleration = math.inf
     """Limit of the absolute acceleration [m/s^2]; moves need one."""
-    initial: Length = 0.0
-    """Position [m] while nothing has moved the joint."""
+    deceleration: MaxAcceleration | None = None
+    """Limit of the absolute acceleration while the joint slows down [m/s^2]; `acceleration` when left out."""
+    initial: Length | None = None
+    """Position [m] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
+    nearest to 0."""
+    mimic: MimicPart | None = None
+    """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
-    def _initial_within_limits(self) -> Self:
+    def _sensible(self) -> Self:
         _check_limits(self, "m")
+        _check_initial(self)
         return self
 
 
 def _check_limits(joint: RevolutePart | PrismaticPart, unit: str) -> None:
     if joint.lower > joint.upper:
         raise rejected(f"must not be above the upper limit {joint.upper:.6g} {unit}", at=("lower",))
-    if not joint.lower <= joint.initial <= joint.upper:
-        given = "" if "initial" in joint.model_fields_set else "(0 when left out) "
+    if joint.initial is not None and not joint.lower <= joint.initial <= joint.upper:
         between = f"between the limits {joint.lower:.6g} {unit} and {joint.upper:.6g} {unit}"
-        raise rejected(f"{given}must be {between}", at=("initial",))
+        raise rejected(f"must be {between}", at=("initial",))
+
+
+def _check_initial(joint: RevolutePart | ContinuousPart | PrismaticPart) -> None:
+    if joint.mimic is not None and joint.initial is not None:
+        rule = f"has no effect on a joint that follows {joint.mimic.joint!r}; remove it"
+        raise rejected(rule, at=("initial",))
 
 
 Joint = Annotated[FixedPart | RevolutePart | ContinuousPart | PrismaticPart | FreePart, Field(discriminator="type")]
@@ -129,5 +170,5 @@ class LinkPart(Part):
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""
     earth: Earth = math.inf
-    """How the link is connected to earth, for the capacitive methods bem and field: grounded, floating, or through a
+    """How the link is connected to earth, for the capacitive method bem: grounded, floating, or through a
     capacitance [F] of what is not modelled (shoes, a mattress)."""

@@ -80,6 +80,11 @@ def load_sources(main: str, sources: Mapping[str, bytes], *, case: str | None = 
     return file.scenario() if case is None else file.case(case)
 
 
+def load_from(library: Library) -> Scenario:
+    """Read a scenario from wherever its files are; ScenarioError as `load`."""
+    return _File(library).scenario()
+
+
 def load_model(file_or_name: str | Path) -> Model:
     """Return a built-in model by its name, or the model that a YAML file holds.
 
@@ -228,7 +233,10 @@ def _read_log(library: Library, text: ScenarioText, root: Node, scenario: Scenar
         name = resolve_name(str(node.value), text.names[node.place.file])
     except SourceRule as error:
         return [problem_at(root, (*PATH, "file"), str(error))]
-    found = read(scenario, library, name)
+    try:
+        found = read(scenario, library, name)
+    except InvalidValue:
+        return []  # links or joints that are their own ancestors, which is told already
     provenance.tracks.update(found.tracks)
     provenance.free_tracks.update(found.free)
     provenance.log_notes.extend(found.notes)

@@ -9,12 +9,12 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, model_validator
 
 from replay.language.fields import Name, Part, Text, Title, rejected
-from replay.language.units import Duration, Rate
+from replay.language.units import Dimensioned, Duration, Rate
 from replay.scenario.collision import CollisionPart
 from replay.scenario.expectations import Between, Expectation, PairExpectation
 from replay.scenario.links import LinkPart
 from replay.scenario.methods import Model, builtin_model
-from replay.scenario.motion import MotionPart
+from replay.scenario.motion import MotionPart, MovePart, Positions
 from replay.scenario.sensors import Sensors
 from replay.scenario.source import ScenarioProvenance
 from replay.scenario.sweep import SweepPart
@@ -31,6 +31,8 @@ class Fragment(Part):
     """Files whose parts are merged in; paths relative to this file, inside the scenario's folder tree."""
     links: dict[Name, LinkPart] = Field(default_factory=dict)
     """Links by name."""
+    poses: dict[Name, Positions] = Field(default_factory=dict)
+    """Joint positions by the name of a pose, for `motion.initial` and the `to` of moves."""
     motion: MotionPart = MotionPart()
     """What moves."""
     collision: CollisionPart = CollisionPart()
@@ -81,6 +83,10 @@ class Scenario(Fragment):
     def frames(self) -> int:
         """Number of frames: floor(duration*rate) + 1, in exact arithmetic."""
         return math.floor(Fraction(self.duration) * Fraction(self.rate)) + 1
+
+    def target(self, move: MovePart) -> dict[str, Dimensioned]:
+        """Return the target position of each joint of a move, as it is written there or in the pose it names."""
+        return self.poses.get(move.to, {}) if isinstance(move.to, str) else move.to
 
     @property
     def sources(self) -> dict[str, bytes]:

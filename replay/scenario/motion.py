@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from replay.language.fields import Flag, Name, Part, Placement, Vector, rejected
 from replay.language.units import (
@@ -41,11 +41,22 @@ class WaypointPart(Part):
         return self
 
 
+Positions = Annotated[dict[Name, JointPosition], Field(min_length=1)]
+"""Position [rad or m] by joint name."""
+
+
+def _kind_of_target(value: object) -> str:
+    return "pose" if isinstance(value, str) else "joints"
+
+
 class MovePart(Part):
     """A move from rest to rest by a trapezoidal velocity profile."""
 
-    to: Annotated[dict[Name, JointPosition], Field(min_length=1)]
-    """Target position [rad or m] by joint name."""
+    to: Annotated[
+        Annotated[Positions, Tag("joints")] | Annotated[Name, Tag("pose")],
+        Discriminator(_kind_of_target),
+    ]
+    """Target position [rad or m] by joint name, or the name of one of `poses`."""
     start: Time | None = None
     """[s]; when left out, the move starts as soon as the previous move of any of its joints has ended."""
     speed: Share = 1.0
@@ -138,6 +149,8 @@ class RecordedPart(Part):
 class MotionPart(Part):
     """What moves; all other joints hold their initial position."""
 
+    initial: Name | None = None
+    """The one of `poses` that its joints begin in; a joint's own `initial` wins."""
     points: dict[Name, Waypoints] = Field(default_factory=dict)
     """Waypoints by joint name."""
     moves: tuple[MovePart, ...] = ()

@@ -14,13 +14,13 @@ from replay.collision.columns import MARGIN
 from replay.language.fields import Part
 from replay.language.globs import Globs, fits
 from replay.language.node import Node
-from replay.language.units import Distance
+from replay.language.units import Dimensioned, Distance
 from replay.scenario.collision import DisablePart
 from replay.scenario.expectations import Expectation
 from replay.scenario.links import ContinuousPart, Joint, PrismaticPart, RevolutePart
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.model import Scenario
-from replay.scenario.motion import KeyframePart, Keyframes, MovePart, WaypointPart, Waypoints
+from replay.scenario.motion import KeyframePart, Keyframes, MovePart, Positions, WaypointPart, Waypoints
 from replay.scenario.source import find
 from replay.sensing.kinds import KINDS
 
@@ -118,6 +118,17 @@ class Names:
     @cached_property
     def _shape_globs(self) -> tuple[Globs, Globs]:
         return Globs([shape.link for shape in self.shapes]), Globs([shape.full for shape in self.shapes])
+
+    @cached_property
+    def poses(self) -> dict[str, dict[str, Dimensioned] | None]:
+        """Joint positions by pose."""
+        return {name: self._entry(Positions, "poses", name) for name in self._map("poses")}
+
+    @property
+    def initial(self) -> str | None:
+        """The pose that the motion begins in."""
+        node = find(self.root, ("motion", "initial"))
+        return None if node is None else _text(node)
 
     @cached_property
     def points(self) -> dict[str, tuple[WaypointPart, ...] | None]:

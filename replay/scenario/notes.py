@@ -94,6 +94,17 @@ def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:
     return found
 
 
+def touching_note(pairs: Sequence[str]) -> list[str]:
+    """Return what is said of pairs "link/shape|link/shape" in contact in the first frame, and YAML to disable them."""
+    verb = "is" if len(pairs) == 1 else "are"
+    rule = f"{verb} in contact in the first frame; where they may be, write below collision.disable:"
+    sides = (pair.split("|") for pair in pairs)
+    return [
+        f"{count(len(pairs), 'pair')} {rule}",
+        *(f"    - {{pair: [{a}, {b}], reason: in contact from the first frame}}" for a, b in sides),
+    ]
+
+
 def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     """Yield the last move of each joint that still moves at the end, and when it ends [s]."""
     from replay.kinematics.motion import joint_profiles
@@ -102,10 +113,11 @@ def _late_moves(scenario: Scenario, end: float) -> Iterator[tuple[int, float]]:
     moves = scenario.motion.moves
     profiles = joint_profiles(linkage(scenario), script(scenario)) if moves else {}
     late: dict[int, float] = {}
-    for joint in {name for move in moves for name in move.to}:
+    targets = [scenario.target(move) for move in moves]
+    for joint in {name for target in targets for name in target}:
         seconds = max(profiles[joint].end, default=0.0)
         if seconds > end + 1e-9:
-            index = max(index for index, move in enumerate(moves) if joint in move.to)
+            index = max(index for index, target in enumerate(targets) if joint in target)
             late[index] = max(seconds, late.get(index, 0.0))
     yield from sorted(late.items())
 

@@ -141,7 +141,7 @@ def _missing(found: _Location, last: str | int, root: Node) -> Problem:
         return locate(root, path).problem(f"{dotted(path)} needs {found.length} entries, not {count}")
     fields = {} if found.owner is None else found.owner.model_fields
     about = fields[last].description if last in fields else None
-    hint = f"; {about.rstrip('.')}" if about else ""
+    hint = f"; {' '.join(about.split()).rstrip('.')}" if about else ""
     return locate(root, path).problem(f"{dotted((*path, last))} is missing{hint}")
 
 

@@ -19,10 +19,13 @@ from replay.logs.exported import ENDINGS, as_csv
 from replay.logs.joint_csv import read_csv
 from replay.logs.joint_log import Choice, JointLog, read_messages
 from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
+from replay.numerics.arrays import Floats
 from replay.scenario.names import SCALAR_JOINTS
 from replay.scenario.problems import did_you_mean
+from replay.scenario.recorded_followers import deviations, of_the_same_name
 from replay.scenario.recorded_frames import pose_track
 from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window, unwrapped
+from replay.scenario.script import linkage
 from replay.scenario.source import Library, SourceRule
 
 if TYPE_CHECKING:
@@ -76,6 +79,7 @@ class _MotionReader:
         self._written: RecordedPart = scenario.motion.recorded
         self._library = library
         self._name = name
+        self._linkage = linkage(scenario)
         self._found = RecordedMotion()
         self._rows: set[int] = set()
 
@@ -93,6 +97,8 @@ class _MotionReader:
                 found.tracks[joint] = self._track(joint, source, log, window)
             except Unusable as error:
                 self._wrong(error)
+        if self._linkage.followers and not found.problems:
+            self._compare_followers(log, window)
         for link, frame in self._written.free.items():
             try:
                 joint, track = self._free_track(link, frame, log, window)
@@ -133,7 +139,8 @@ class _MotionReader:
             units = {unit: factor * 10**9 for unit, factor in TIME.units.items()}
             time = (written.time.column, written.time.unit) if written.time else (None, None)
             format = Format(*time, units, written.separator, written.decimal)
-            needed = {joint.name for joint in written.joints.values()} or set(self._scalar_joints())
+            needed = {joint.name for joint in written.joints.values()} | self._linkage.followers.keys()
+            needed = needed if written.joints else set(self._scalar_joints())
             return read_csv(shown, data, format, needed, self._max_gap), digest
         except RecordingError as error:
             raise Unusable((*PATH, "file"), error.reason) from None
@@ -183,11 +190,10 @@ class _MotionReader:
 
         if self._written.joints:
             return dict(self._written.joints)
-        exported = {unit_of(name)[0]: name for name in log.joints}
         common = {}
         for mine in self._scalar_joints():
-            theirs = mine if mine in log.joints else exported.get(f"{mine} position", exported.get(mine, ""))
-            if theirs and not self._scripted(mine):
+            theirs = of_the_same_name(mine, log)
+            if theirs and not self._scripted(mine) and mine not in self._linkage.followers:
                 common[mine] = RecordedJointPart(name=theirs)
         if not common and not self._written.free:
             rule = f"has no joint of the scenario's names; it has {sorted(log.joints)}"
@@ -203,13 +209,16 @@ class _MotionReader:
         motion = self._scenario.motion
         if joint in motion.points:
             return "motion.points"
-        return "motion.moves" if any(joint in move.to for move in motion.moves) else ""
+        return "motion.moves" if any(joint in self._scenario.target(move) for move in motion.moves) else ""
 
     def _track(self, joint: str, source: RecordedJointPart, log: JointLog, window: Window) -> Track:
         path = (*PATH, "joints", joint)
         mine = self._scalar_joints()
         if joint not in mine:
             raise Unusable(path, f"is no joint with a position; {did_you_mean(joint, mine, what='joints are')}")
+        if joint in self._linkage.followers:
+            leader = self._linkage.followers[joint].joint
+            raise Unusable(path, f"is a joint that follows {leader!r}, which alone moves it; name the joint that leads")
         if other := self._scripted(joint):
             raise Unusable(path, f"is a joint that {other} moves as well; keep one of the two")
         if source.name not in log.joints:
@@ -219,20 +228,39 @@ class _MotionReader:
         if source.unit is not None and source.unit not in dimension.units:
             rule = f"is no unit of joint {joint!r}, which is {mine[joint]}; units are {', '.join(dimension.units)}"
             raise Unusable((*path, "unit"), rule)
+        seconds, position = self._positions(path, mine[joint], source, log, window)
+        if mine[joint] == "revolute":
+            self._note_jumps(path, seconds, position)
+        return Track(seconds, position, self._tolerance(path, joint, mine[joint], position))
+
+    def _positions(
+        self, path: tuple[str | int, ...], kind: str, source: RecordedJointPart, log: JointLog, window: Window
+    ) -> tuple[Floats, Floats]:
+        """Return times (n,) [s] and positions (n,) [rad or m] that the log has of a joint of a kind."""
+        dimension = LENGTH if kind == "prismatic" else ANGLE
         headed = unit_of(source.name)[1]
         factor = dimension.units[source.unit or (headed if headed in dimension.units else dimension.si)]
         series = in_window(path, log.joints[source.name], window)
         self._rows.update(series.row.tolist())
         value = series.value
-        if mine[joint] == "continuous":
+        if kind == "continuous":
             value = unwrapped(value, float(ANGLE.units["deg"] * 360 / factor))
         position = value if factor == 1 else value * float(factor)
         if window.published:
             check_turns(path, series.time, position)
-        seconds = window.seconds(series.time)
-        if mine[joint] == "revolute":
-            self._note_jumps(path, seconds, position)
-        return Track(seconds, position, self._tolerance(path, joint, mine[joint], position))
+        return window.seconds(series.time), position
+
+    def _compare_followers(self, log: JointLog, window: Window) -> None:
+        from replay.scenario.motion import RecordedJointPart
+
+        path = (*PATH, "file")
+
+        def read(kind: str, name: str) -> tuple[Floats, Floats]:
+            return self._positions(path, kind, RecordedJointPart(name=name), log, window)
+
+        joints = {joint.name: joint for joint in self._linkage.joints}
+        for rule in deviations(joints, self._linkage.followers, self._found.tracks, log, read):
+            self._note(path, rule)
 
     def _note_jumps(self, path: tuple[str | int, ...], seconds: np.ndarray, position: np.ndarray) -> None:
         jumps = np.flatnonzero(np.abs(np.diff(position)) > math.pi)

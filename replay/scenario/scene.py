@@ -187,7 +187,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
 
 def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...], tuple[str, ...]]:
     """Return all shapes sorted by name, and the notes on meshes; a mesh file is read once for each scale."""
-    meshes: dict[tuple[str, float], Solid] = {}
+    meshes: dict[tuple[str, tuple[float, float, float]], Solid] = {}
     notes: dict[str, None] = {}
     problems: list[Problem] = []
     found = []
@@ -196,9 +196,9 @@ def _shapes(scenario: Scenario, machine: Linkage) -> tuple[tuple[SceneShape, ...
         file = scenario.provenance.meshes.get((link, name))
         if file is None:
             raise MeshError(shape.file, "is not at hand: scenarios with meshes come from `load` or `load_sources`")
-        if (file, shape.scale) not in meshes:
-            meshes[file, shape.scale] = load_mesh(file, scale=shape.scale, data=scenario.sources[file])
-        solid = meshes[file, shape.scale]
+        if (file, shape.scales) not in meshes:
+            meshes[file, shape.scales] = load_mesh(file, scale=shape.scales, data=scenario.sources[file])
+        solid = meshes[file, shape.scales]
         notes.update(dict.fromkeys(f"{file}: {note}" for note in solid.notes))
         return solid
 
@@ -249,6 +249,10 @@ def _primitive(shape: shapes.ShapePart) -> Solid:
             return primitives.cylinder(shape.radius, shape.height, shape.chord_error)
         case shapes.ConePart():
             return primitives.cone(shape.radius, shape.height, shape.chord_error)
+        case shapes.CapsulePart():
+            return primitives.capsule(shape.radius, shape.height, shape.chord_error)
+        case shapes.EllipsoidPart():
+            return primitives.ellipsoid(shape.radii, shape.chord_error)
         case shapes.ArcPart():
             return primitives.arc(shape.radius, shape.span, shape.width, shape.thickness, shape.chord_error)
         case _:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
 from replay.geometry.mesh_file import FORMATS
 from replay.language.fields import Flag, Part, Pose, Size2, Size3, rejected
-from replay.language.units import Aperture, Scale, Size
+from replay.language.units import Aperture, AxisScale, Scale, Size
 
 FINEST_CHORD = 1e-5
 """Smallest chord error as a fraction of the radius: a sphere then has about 0.6 million triangles."""
+
+SMALLEST_SCALE = 1e-9
+"""Smallest size of a scale along one axis: that of one along all."""
 
 Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}([0-9a-fA-F]{2})?$")]
 
@@ -69,11 +72,15 @@ class CurvedPart(ShapePart):
 
     @model_validator(mode="after")
     def _sensible_chord_error(self) -> Self:
-        finest = FINEST_CHORD * self.radius
-        if self.chord_error < finest:
-            given = "" if "chord_error" in self.model_fields_set else f"({self.chord_error:.6g} m when left out) "
-            raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
+        _check_chord_error(self, self.radius)
         return self
+
+
+def _check_chord_error(shape: CurvedPart | EllipsoidPart, radius: float) -> None:
+    finest = FINEST_CHORD * radius
+    if shape.chord_error < finest:
+        given = "" if "chord_error" in shape.model_fields_set else f"({shape.chord_error:.6g} m when left out) "
+        raise rejected(f"{given}must be >= {finest:.6g} m, {FINEST_CHORD:g} of the radius", at=("chord_error",))
 
 
 class SpherePart(CurvedPart):
@@ -98,6 +105,29 @@ class ConePart(CurvedPart):
     """Height [m]."""
 
 
+class CapsulePart(CurvedPart):
+    """A cylinder along z between two half spheres, its origin at half height."""
+
+    type: Literal["capsule"]
+    height: Size
+    """Height of the cylinder between the half spheres [m]."""
+
+
+class EllipsoidPart(ShapePart):
+    """An ellipsoid around its origin."""
+
+    type: Literal["ellipsoid"]
+    radii: Size3
+    """Half axes along x, y and z [m]."""
+    chord_error: Size = 0.001
+    """Largest distance between the true surface and its triangles [m]."""
+
+    @model_validator(mode="after")
+    def _sensible_chord_error(self) -> Self:
+        _check_chord_error(self, max(self.radii))
+        return self
+
+
 class ArcPart(CurvedPart):
     """A bent bar in the xy plane, symmetric about +x: the C of a C-arm."""
 
@@ -116,17 +146,46 @@ class ArcPart(CurvedPart):
         return self
 
 
+def _kind_of_scale(value: object) -> str:
+    return "axes" if isinstance(value, list | tuple) else "all"
+
+
 class MeshPart(ShapePart):
     """The triangles of a file."""
 
     type: Literal["mesh"]
     file: MeshFile
     """Path relative to the file that names it, inside the scenario's folder tree, or package://PYTHON_PACKAGE/path."""
-    scale: Scale
-    """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres."""
+    scale: Annotated[
+        Annotated[Scale, Tag("all")] | Annotated[tuple[AxisScale, AxisScale, AxisScale], Tag("axes")],
+        Discriminator(_kind_of_scale),
+    ]
+    """Metres per unit of the file: 1 for a mesh in metres, 0.001 for one in millimetres; three numbers along x, y, z,
+    of which a negative one mirrors."""
+
+    @model_validator(mode="after")
+    def _has_extent(self) -> Self:
+        for axis, factor in enumerate(self.scales):
+            if abs(factor) < SMALLEST_SCALE:
+                raise rejected(f"must not be between -{SMALLEST_SCALE:g} and {SMALLEST_SCALE:g}", at=("scale", axis))
+        return self
+
+    @property
+    def scales(self) -> tuple[float, float, float]:
+        """The scale along each axis."""
+        return self.scale if isinstance(self.scale, tuple) else (self.scale, self.scale, self.scale)
 
 
 Shape = Annotated[
-    CubePart | CuboidPart | SpherePart | CylinderPart | ConePart | PlanePart | ArcPart | MeshPart,
+    CubePart
+    | CuboidPart
+    | SpherePart
+    | CylinderPart
+    | ConePart
+    | CapsulePart
+    | EllipsoidPart
+    | PlanePart
+    | ArcPart
+    | MeshPart,
     Field(discriminator="type"),
 ]

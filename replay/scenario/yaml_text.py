@@ -1,13 +1,11 @@
 """YAML 1.2 text to a tree of nodes that know their place: line and column of every key and value.
 
-The events come from ruamel.yaml's scanner; what a plain scalar means is decided here, by the core schema of YAML 1.2
-(section 10.3.2): `1e-6` is a number, and `on`, `no`, `12:30` and `1_000` are text.
+The events come from ruamel.yaml's scanner; what a plain scalar means is decided by `yaml_scalar`.
 """
 
 from __future__ import annotations
 
 import functools
-import math
 import re
 from collections.abc import Iterator
 from typing import Any, Final
@@ -16,6 +14,7 @@ from replay import limits
 from replay.errors import Problem
 from replay.language import decimal_comma
 from replay.language.node import Node, Place, Scalar
+from replay.scenario.yaml_scalar import meaning
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "Node", "parse"]
 
@@ -27,13 +26,6 @@ MAX_MESSAGE: Final = 400
 _KEPT_BYTES: Final = 16 << 10  # of one file; what is longer is seldom shared, and its tree is large
 _KEPT_FILES: Final = 32
 
-_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
-_INFINITY = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
-_NOT_A_NUMBER = (".nan", ".NaN", ".NAN")
-_NULL = ("", "~", "null", "Null", "NULL")
-_TRUE = ("true", "True", "TRUE")
-_FALSE = ("false", "False", "FALSE")
 _TAG = "tag:yaml.org,2002:"
 
 
@@ -291,27 +283,8 @@ class _Builder:
         return node
 
     def resolve(self, event: Any, text: str) -> Scalar:
-        """Return what a plain scalar means in the core schema."""
-        if text in _NULL:
-            return None
-        if text in _TRUE or text in _FALSE:
-            return text in _TRUE
-        if _INFINITY.fullmatch(text):
-            return -math.inf if text[0] == "-" else math.inf
-        if text in _NOT_A_NUMBER:
-            return math.nan
-        integer = _INTEGER.fullmatch(text) is not None
-        if not integer and _FLOAT.fullmatch(text) is None:
-            return text
-        if len(text) > limits.NUMBER_DIGITS:
-            self.report(event, f"a number of {len(text)} characters; at most {limits.NUMBER_DIGITS} are read")
-            return 0
-        if integer:
-            bases = {"0o": 8, "0x": 16}
-            base = bases.get(text[:2], 10)
-            return int(text[2:] if base != 10 else text, base)
-        number = float(text)
-        if math.isinf(number):
-            self.report(event, f"{text} is too large for a number; write .inf where infinity is meant")
-            return 0.0
-        return number
+        """Return what a plain scalar means."""
+        value, wrong = meaning(text)
+        if wrong:
+            self.report(event, wrong)
+        return value

@@ -74,3 +74,18 @@ def test_one_of_a_kind_is_not_said_in_the_plural(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "one: passed, 1 frame in" in text
     assert "one.mcap: one, 1 frame, 0 s, " in text
+
+
+def test_what_touches_in_the_first_frame_is_told_with_lines_to_copy(tmp_path, capsys):
+    path = tmp_path / "touch.yaml"
+    ball = "shapes: {ball: {type: sphere, radius: 1}}"
+    links = f"  a: {{{ball}}}\n  b: {{pose: {{xyz: [1.5, 0, 0]}}, {ball}}}\n  c: {{pose: {{xyz: [5, 0, 0]}}, {ball}}}\n"
+    path.write_text(f"version: 1\nname: touch\nrate: 10\nduration: 0\nlinks:\n{links}")
+    assert run(["validate", str(path), "--deep", "--format", "json"]) is ExitCode.FINE
+    said = capsys.readouterr()
+    assert json.loads(said.out)[0]["touching"] == ["a/ball|b/ball"]
+    head, line = said.err.splitlines()
+    assert head.startswith("replay: note: 1 pair is in contact in the first frame;")
+    path.write_text(path.read_text() + f"collision:\n  disable:\n{line}\n")
+    assert run(["validate", str(path), "--deep"]) is ExitCode.FINE
+    assert capsys.readouterr().err == ""

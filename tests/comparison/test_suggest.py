@@ -57,3 +57,13 @@ def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
     assert [line.split(":")[0] for line in comments] == ['#   "/distance/left/distance', '#   "made_up']
     remaining, _ = compared(rules=read_rules(path))
     assert [item.signal.full_name for item in remaining.cases[0].difference.deciding] == ["/distance/left/distance"]
+
+
+@pytest.mark.parametrize("accepted", [False, True])
+def test_frames_that_only_one_run_has_are_a_comment_unless_a_rule_accepts_them(accepted):
+    rules = Rules((Rule(("/frames",), Tolerance(ignore=True), "shorter"),)) if accepted else None
+    pair = RecordingPair(BASELINE, made_up.only_frames(BASELINE, slice(0, 98)))
+    found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=rules)),))
+    lines = [line for line in suggest(found).splitlines() if "missing in the candidate" in line]
+    assert len(lines) == (0 if accepted else 1)
+    assert all(line.startswith('#   "made_up: 2 frames missing') for line in lines)

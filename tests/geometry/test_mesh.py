@@ -307,3 +307,19 @@ def test_what_is_closed_as_it_is_wound_stays() -> None:
             solid = solid_from_triangles(mesh)
             assert solid.watertight and solid.notes == () and solid.volume == pytest.approx(len(cells))
             assert contains(solid.triangles, cells + 0.01).all()
+
+
+def test_a_scale_along_each_axis_mirrors_where_it_is_negative(tmp_path):
+    path = tmp_path / "tetrahedron.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    for scale, turned in (((2.0, 3.0, 4.0), False), ((2.0, -3.0, 4.0), True), ((-2.0, -3.0, 4.0), False)):
+        solid = load_mesh(path, scale=scale)
+        assert solid.notes == ()  # nothing is inside out
+        assert solid.volume == pytest.approx(4.0, rel=1e-15)
+        first = solid.triangles[0].tolist()
+        x, y, _ = scale
+        b, c = [0.0, y, 0.0], [x, 0.0, 0.0]
+        assert first == [[0.0, 0.0, 0.0], *((c, b) if turned else (b, c))]
+    for scale in ((1.0, 0.0, 1.0), (1.0, 2.0), (1.0, float("nan"), 1.0), -1.0):
+        with pytest.raises(InvalidValue, match="scale"):
+            load_mesh(path, scale=scale)

@@ -24,6 +24,10 @@ SHAPES: dict[str, Callable[[], Solid]] = {
     "coarse sphere": lambda: primitives.sphere(0.2, 1.0),
     "cylinder": lambda: primitives.cylinder(0.2, 1.5, E),
     "cone": lambda: primitives.cone(0.2, 1.5, E),
+    "capsule": lambda: primitives.capsule(0.2, 1.5, E),
+    "coarse capsule": lambda: primitives.capsule(0.2, 1e-6, 1.0),
+    "ellipsoid": lambda: primitives.ellipsoid((0.2, 0.3, 0.05), E),
+    "coarse ellipsoid": lambda: primitives.ellipsoid((0.2, 0.3, 1e-4), 1.0),
     "arc": lambda: primitives.arc(0.8, 2.5, 0.2, 0.1, E),
     "short arc": lambda: primitives.arc(0.8, 0.01, 0.2, 0.1, 1.0),
     "ring": lambda: primitives.arc(0.8, 2 * math.pi, 0.2, 0.1, E),
@@ -59,6 +63,10 @@ def test_volumes_tend_to_the_true_ones() -> None:
     assert primitives.sphere(0.2, e).volume == pytest.approx(4 / 3 * math.pi * 0.2**3, rel=3 * e / 0.2)
     assert primitives.cylinder(0.2, 1.5, e).volume == pytest.approx(math.pi * 0.2**2 * 1.5, rel=2 * e / 0.2)
     assert primitives.cone(0.2, 1.5, e).volume == pytest.approx(math.pi * 0.2**2 * 0.5, rel=2 * e / 0.2)
+    capsule = math.pi * 0.2**2 * 1.5 + 4 / 3 * math.pi * 0.2**3
+    assert primitives.capsule(0.2, 1.5, e).volume == pytest.approx(capsule, rel=3 * e / 0.2)
+    ellipsoid = 4 / 3 * math.pi * 0.2 * 0.1 * 0.3
+    assert primitives.ellipsoid((0.2, 0.1, 0.3), e).volume == pytest.approx(ellipsoid, rel=3 * e / 0.1)
     ring = primitives.arc(0.8, 2 * math.pi, 0.2, 0.1, e)
     assert ring.volume == pytest.approx(2 * math.pi * 0.8 * 0.1 * 0.2, rel=2 * e / 0.8)
     assert primitives.arc(0.8, math.pi, 0.2, 0.1, e).volume == pytest.approx(0.5 * ring.volume, rel=2 * e / 0.8)
@@ -84,6 +92,25 @@ def test_chord_error(radius: float, fraction: float, aspect: float, span: float)
     depth = radius - np.linalg.norm(inside_points(sphere), axis=1)
     assert -slack <= depth.min() and depth.max() <= sphere.chord_error + slack
     assert sphere.chord_error <= limit
+
+    capsule = primitives.capsule(radius, aspect * radius, limit)
+    points = inside_points(capsule)
+    above = np.maximum(np.abs(points[:, 2]) - 0.5 * aspect * radius, 0.0)
+    depth = radius - np.hypot(np.hypot(points[:, 0], points[:, 1]), above)
+    assert -slack <= depth.min() and depth.max() <= capsule.chord_error + slack
+    assert capsule.chord_error <= limit
+
+    radii = radius * np.array([1.0, aspect, 0.5 * aspect]) / max(1.0, aspect)
+    ellipsoid = primitives.ellipsoid(radii, limit)
+    points = inside_points(ellipsoid)
+    reach = np.linalg.norm(points / radii, axis=1)
+    assert reach.max() <= 1.0 + 1e-14
+    a, b, c = np.moveaxis(ellipsoid.triangles, 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    lifted = points + ellipsoid.chord_error * np.repeat(normals, len(points) // len(normals), axis=0)
+    assert (np.linalg.norm(lifted / radii, axis=1) >= 1.0 - 1e-13).all()  # the surface is not further than this
+    assert ellipsoid.chord_error <= limit
 
     cylinder = primitives.cylinder(radius, aspect * radius, limit)
     points = inside_points(cylinder)
@@ -149,6 +176,11 @@ def test_transformed() -> None:
         lambda: primitives.sphere(1.0, 1e-9),
         lambda: primitives.cylinder(1.0, 1.0, 1e-15),
         lambda: primitives.cone(1.0, -1.0, E),
+        lambda: primitives.capsule(1.0, 0.0, E),
+        lambda: primitives.capsule(1.0, 1.0, 1e-9),
+        lambda: primitives.ellipsoid((1.0, 2.0), E),
+        lambda: primitives.ellipsoid((1.0, -2.0, 1.0), E),
+        lambda: primitives.ellipsoid((1.0, 2.0, 1.0), 1e-9),
         lambda: primitives.arc(1.0, 7.0, 0.1, 0.1, E),
         lambda: primitives.arc(1.0, 1.0, 0.1, 2.0, E),
     ],

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from replay.errors import InvalidValue
-from replay.kinematics.linkage import Joint, JointType, Link, Linkage
+from replay.kinematics.linkage import Joint, JointType, Link, Linkage, Mimic
 from replay.numerics import transforms
 
 
@@ -122,3 +122,31 @@ def test_links_that_form_no_trees_are_refused(links, message):
         Linkage(
             [Link(name, parent, transforms.identity(), Joint(f"{name}{k}")) for k, (name, parent) in enumerate(links)]
         )
+
+
+def test_joints_follow_in_chains():
+    """a leads, b = 0.5 a + 0.2, c = 2 b + 0.1: 0.9 where a is 0.4; a reader that forgets b's offset says 0.5."""
+    joints = [
+        Joint("a", JointType.REVOLUTE),
+        Joint("b", JointType.PRISMATIC, lower=0.0, upper=0.6, mimic=Mimic("a", 0.5, 0.2)),
+        Joint("c", JointType.REVOLUTE, lower=-1.0, mimic=Mimic("b", 2.0, 0.1)),
+    ]
+    machine = Linkage([Link(joint.name, None, transforms.identity(), joint) for joint in joints])
+    assert machine.followers == {"b": Mimic("a", 0.5, 0.2), "c": Mimic("a", 1.0, 0.5)}
+    np.testing.assert_allclose(machine.followed(np.array([[0.4, 7.0, 7.0]])), [[0.4, 0.4, 0.9]], rtol=1e-15)
+    lower, upper = machine.ranges()["a"]
+    assert (lower, upper) == pytest.approx((-0.4, 0.8), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("mimics", "rule"),
+    [
+        ({"a": "b", "b": "a"}, "follow each other in a circle"),
+        ({"a": "a"}, "follow each other in a circle"),
+        ({"a": "c"}, "must be one of the joints with a position"),
+    ],
+)
+def test_joints_that_cannot_be_followed_are_refused(mimics, rule):
+    joints = [Joint(name, JointType.REVOLUTE, mimic=Mimic(mimics[name]) if name in mimics else None) for name in "ab"]
+    with pytest.raises(InvalidValue, match=rule):
+        Linkage([Link(joint.name, None, transforms.identity(), joint) for joint in joints])

@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replay.errors import InvalidValue, MotionLimitError
-from replay.kinematics.linkage import Joint, JointType, Link, Linkage
+from replay.kinematics.linkage import Joint, JointType, Link, Linkage, Mimic
 from replay.kinematics.motion import Keyframe, Move, Script, Track, Waypoint, plan, sample
 from replay.kinematics.profiles import from_pieces, through_waypoints, trapezoid, trapezoid_time
 from replay.numerics import transforms
 from tests.amounts import cases
+
+LOGGED = Track(np.arange(3.0), np.zeros(3))
 
 
 def linkage(*joints: Joint) -> Linkage:
@@ -164,6 +166,8 @@ def test_a_limit_is_exceeded_by_no_more_than_rounding(excess, accepted, sign):
         (Script(moves=(Move({"hinge": 1.0}, speed=1.5),)), "above 0 and at most 1"),
         (Script(points={"hinge": (Waypoint(0, 0),)}, moves=(Move({"hinge": 1.0}),)), "keep one of the two"),
         (Script(free={"hinge": ()}), "names no free joint"),
+        (Script(points={"hinge": (Waypoint(0, 0),)}, recorded={"hinge": LOGGED}), "moved by motion.points or moves"),
+        (Script(moves=(Move({"hinge": 1.0}),), recorded={"hinge": LOGGED}), "moved by motion.points or moves"),
     ],
 )
 def test_a_script_that_makes_no_sense_says_what_would(script, message):
@@ -211,3 +215,54 @@ def test_a_moment_does_not_depend_on_what_is_sampled_with_it(cuts):
     parts = [motion.states(part) for part in np.split(seconds, sorted(cuts))]
     for name in ("positions", "velocities", "free_poses"):
         assert np.concatenate([getattr(part, name) for part in parts]).tobytes() == getattr(whole, name).tobytes()
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.3, 2.0])  # the second is where the top velocity is just reached
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_move_slows_down_at_its_own_rate(distance, sign):
+    velocity, faster, slower = 0.6, 2.0, 0.75
+    joint = hinge(velocity=velocity, acceleration=faster, deceleration=slower)
+    motion = plan(linkage(joint), Script(moves=(Move({"hinge": sign * distance}),)))
+    top = min(velocity, math.sqrt(2.0 * distance * faster * slower / (faster + slower)))
+    ramps = 0.5 * top**2 * (1.0 / faster + 1.0 / slower)
+    total = top / faster + top / slower + (distance - ramps) / top
+    seconds = np.array([0.0, 0.5 * top / faster, top / faster, total - top / slower, total - 0.5 * top / slower, total])
+    states = motion.states(seconds)
+    rise, fall = 0.5 * top**2 / faster, 0.5 * top**2 / slower
+    expected = np.array([0.0, 0.25 * rise, rise, distance - fall, distance - 0.25 * fall, distance])
+    np.testing.assert_allclose(states.positions[:, 0], sign * expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        states.velocities[:-1, 0], sign * np.array([0, 0.5, 1, 1, 0.5]) * top, rtol=0, atol=1e-14
+    )
+
+
+def test_slowing_down_is_held_against_the_deceleration_in_both_directions():
+    # x = 3 t^2 - 2 t^3 on [0, 1]: speeds up by 6 at the start, slows down by 6 at the end
+    for sign in (1.0, -1.0):
+        there = (Waypoint(0.0, 0.0, 0.0), Waypoint(1.0, sign, 0.0))
+        plan(linkage(hinge(acceleration=6.0, deceleration=7.0)), Script(points={"hinge": there}))
+        plan(linkage(hinge(acceleration=7.0, deceleration=6.0)), Script(points={"hinge": there}))
+        for limits, time in (
+            ({"acceleration": 5.0, "deceleration": 7.0}, 0.0),
+            ({"acceleration": 7.0, "deceleration": 5.0}, 1.0),
+        ):
+            with pytest.raises(MotionLimitError) as caught:
+                plan(linkage(hinge(**limits)), Script(points={"hinge": there}))
+            assert caught.value.time == pytest.approx(time, abs=1e-12)
+            assert abs(caught.value.limit) == 5.0
+
+
+def test_a_joint_that_follows_moves_with_its_leader_and_keeps_its_own_limits():
+    leader = hinge("leader", velocity=1.0, acceleration=2.0)
+    follower = Joint("follower", JointType.PRISMATIC, upper=0.2, velocity=0.5, mimic=Mimic("leader", -0.1, 0.05))
+    machine = linkage(leader, follower)
+    seconds = np.linspace(0.0, 3.0, 50)
+    states = sample(machine, Script(moves=(Move({"leader": 1.0}),)), seconds)
+    at, of = machine.joint_names.index("leader"), machine.joint_names.index("follower")
+    np.testing.assert_allclose(states.positions[:, of], 0.05 - 0.1 * states.positions[:, at], rtol=0, atol=1e-16)
+    np.testing.assert_allclose(states.velocities[:, of], -0.1 * states.velocities[:, at], rtol=0, atol=1e-16)
+    with pytest.raises(MotionLimitError, match=r"'follower': position = 0\.25 m"):
+        plan(machine, Script(moves=(Move({"leader": -2.0}),)))
+    for script in (Script(moves=(Move({"follower": 0.1}),)), Script(points={"follower": (Waypoint(0.0, 0.1),)})):
+        with pytest.raises(InvalidValue, match="follows joint 'leader'"):
+            plan(machine, script)

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from replay.language.fields import Title
+from replay.language.fields import Title, is_title
 
 TITLE = TypeAdapter(Title)
 
@@ -13,6 +13,7 @@ TITLE = TypeAdapter(Title)
 )
 def test_names_that_every_file_system_takes(name):
     assert TITLE.validate_python(name) == name
+    assert is_title(name)
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,7 @@ def test_names_that_every_file_system_takes(name):
 def test_names_that_some_file_system_refuses(name):
     with pytest.raises(ValidationError):
         TITLE.validate_python(name)
+    assert not is_title(name)
 
 
 @pytest.mark.parametrize("mark", ["\u202e", "\u2066", "\u200f", "\u200b", "\u2028", "\ufeff"])

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from replay.language import units
 from replay.language.units import DIMENSIONS, JointPosition, Length, Quantity, Range
 
 DECIMALS = st.decimals(allow_nan=False, allow_infinity=False, places=6, min_value=-(10**9), max_value=10**9)
@@ -113,3 +114,46 @@ def test_no_unit_stands_for_two_dimensions():
     for dimension in DIMENSIONS:
         assert dimension.units[dimension.si] == Fraction(1)
         read(dimension, dimension.example)
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "most", "open_below"),
+    [
+        ("Number", -1e100, 1e100, False),
+        ("Length", -1e12, 1e12, False),
+        ("Size", 1e-9, 1e12, False),
+        ("Distance", 0.0, 1e12, False),
+        ("Range", 0.0, math.inf, True),
+        ("Angle", -1e12, 1e12, False),
+        ("Aperture", 0.0, 2.0 * math.pi, True),
+        ("Time", 0.0, 1e9, False),
+        ("Duration", 0.0, 1e9, False),
+        ("Rate", 0.0, 1e9, True),
+        ("MaxVelocity", 1e-9, math.inf, False),
+        ("MaxAngularVelocity", 1e-9, math.inf, False),
+        ("MaxAcceleration", 1e-9, math.inf, False),
+        ("MaxAngularAcceleration", 1e-9, math.inf, False),
+        ("Capacitance", 1e-18, 1.0, False),
+        ("StrayCapacitance", 0.0, 1.0, False),
+        ("Permittivity", 1e-18, 1.0, False),
+        ("Voltage", -1e6, 1e6, False),
+        ("Supply", 1e-6, 1e6, False),
+        ("Share", 1e-3, 1.0, False),
+        ("Scale", 1e-9, 1e9, False),
+    ],
+)
+def test_a_quantity_takes_its_bounds_and_nothing_beyond(name, least, most, open_below):
+    adapter = TypeAdapter(getattr(units, name))
+    inside = [least, most] if not open_below else [5e-324 if name != "Rate" else 1e-9, most]
+    for value in inside:
+        assert float(adapter.validate_python(value)) == value
+    beyond = [math.nextafter(least, -math.inf), *([least] if open_below else [])]
+    beyond += [math.nextafter(most, math.inf)] if most < math.inf else []
+    for value in beyond:
+        with pytest.raises(ValidationError):
+            adapter.validate_python(value)
+    if most < math.inf:
+        with pytest.raises(ValidationError):
+            adapter.validate_python(math.inf)
+    with pytest.raises(ValidationError):
+        adapter.validate_python(math.nan)

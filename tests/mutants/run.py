@@ -52,8 +52,8 @@ def planted_faults() -> list[Planted]:
 
 
 def equivalents() -> set[tuple[str, str, str]]:
-    """Return file, text and new text of the mutations that are known to change nothing."""
-    return {(one["file"], one["old"].strip(), one["new"].strip()) for one in _yaml("equivalent.yaml")}
+    """Return file, text and new text of mutations that are known to change nothing; "" where none of a line does."""
+    return {(one["file"], one["old"].strip(), one.get("new", "").strip()) for one in _yaml("equivalent.yaml")}
 
 
 def _yaml(name: str) -> list[dict[str, Any]]:
@@ -85,7 +85,8 @@ def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[lis
                 break
             if (mutation.file, mutation.line) in lines:
                 continue
-            if (mutation.file, mutation.old.strip(), mutation.new.strip()) in known:
+            old, new = mutation.old.strip(), mutation.new.strip()
+            if not known.isdisjoint({(mutation.file, old, new), (mutation.file, old, "")}):
                 left_out[room] = left_out.get(room, 0) + 1
             elif is_python(mutation.applied_to((root / mutation.file).read_text(encoding="utf-8"))):
                 lines.add((mutation.file, mutation.line))
@@ -137,7 +138,7 @@ class Experience:
 
 
 def try_mutation(
-    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, budget: float
+    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, options: argparse.Namespace
 ) -> tuple[Outcome, str]:
     """Return what became of a mutation and how its kernels were run.
 
@@ -146,13 +147,14 @@ def try_mutation(
     """
     text = mutation.applied_to((tree.root / mutation.file).read_text(encoding="utf-8"))
     ways = ["plain", "compiled"] if has_kernels(tree.root / mutation.file) else ["compiled"]
+    ways = ways[:1] if options.plain else ways
     spent = 0.0
     for how in ways:
         while True:
             seconds = experience.seconds(how)
-            tests = targets.of(mutation.file, seconds, budget)
+            tests = targets.of(mutation.file, seconds, options.budget)
             if how == "plain":
-                tests = [test for test in tests if seconds[test] <= budget]
+                tests = [test for test in tests if seconds[test] <= options.budget]
             if not tests:
                 outcome = Outcome("passed", 0.0, {}, "no test is about it")
                 break
@@ -179,7 +181,7 @@ def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     todo = [mutation for mutation in mutations if mutation.id not in results]
     _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
     for number, mutation in enumerate(todo, 1):
-        outcome, how = try_mutation(mutation, tree, targets, experience, options.budget)
+        outcome, how = try_mutation(mutation, tree, targets, experience, options)
         result = {
             "id": mutation.id,
             "place": f"{mutation.file}:{mutation.line}",
@@ -256,6 +258,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--room", action="append", default=[], help="only this room's share; may be repeated")
     parser.add_argument("--budget", type=float, default=40.0, help="seconds of tests that are asked about one mutant")
+    parser.add_argument("--plain", action="store_true", help="kernels as plain Python alone: quick, and more survive")
     parser.add_argument("--again", action="store_true", help="try survivors of an earlier run again")
     parser.add_argument("--planted", nargs="*", metavar="NAME", help="the faults of planted.yaml instead, or some")
     parser.add_argument("--work", type=Path, default=CHECKOUT / "recordings" / "mutants")

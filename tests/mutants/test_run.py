@@ -168,4 +168,4 @@ def test_a_planted_fault_can_be_planted_and_its_tests_are_there(fault):
 def test_what_is_known_to_change_nothing_still_stands_there():
     for file, old, new in equivalents():
         found = {(m.old.strip(), m.new.strip()) for m in mutations_of(file, (CHECKOUT / file).read_text())}
-        assert (old, new) in found, f"{file}: {old}"
+        assert (old, new) in found or (not new and old in {line for line, _ in found}), f"{file}: {old}"

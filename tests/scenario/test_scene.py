@@ -116,7 +116,7 @@ def test_equal_meshes_are_read_once(monkeypatch):
     mesh = "{type: mesh, file: w.stl, scale: 1}"
     text = f"links: {{a: {{shapes: {{s: {mesh}, t: {mesh}}}}}, b: {{shapes: {{s: {mesh.replace('1', '2')}}}}}}}\n"
     build_text(text, w=(FULL.parent / "meshes" / "wedge.stl").read_bytes())
-    assert read == [(("w.stl",), 1.0), (("w.stl",), 2.0)]
+    assert read == [(("w.stl",), (1.0, 1.0, 1.0)), (("w.stl",), (2.0, 2.0, 2.0))]
 
 
 def test_every_mesh_that_cannot_be_used_is_told_with_its_place():

@@ -25,7 +25,15 @@ from replay.sensing.distance.columns import Detection
 pytestmark = pytest.mark.compiled  # phantoms of thousands of triangles
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-NAMES = ("carm_bodyguard", "carm_clear", "carm_head_contact", "carm_near", "carm_parking", "doctor_walks_in")
+NAMES = (
+    "carm_bodyguard",
+    "carm_clear",
+    "carm_head_contact",
+    "carm_near",
+    "carm_parking",
+    "doctor_walks_in",
+    "panda_meets_person",
+)
 FILES = sorted(SCENARIOS.rglob("*.yaml"))
 
 PANEL = (np.array([0.42, 0.42, 0.12]), np.array([0.0, 0.0, 0.06]))  # size, middle in the detector's frame [m]
@@ -238,3 +246,17 @@ def test_the_guard_sees_the_doctor_come_nearer(runs):
     assert (recording.collision.level[:, doctor] < Level.CONTACT).all()
     path = poses(recording, "doctor")[:, :3, 3]
     assert path[0, 1] - path[-1, 1] > 2.0, "she walks from the door to the table"
+
+
+def test_the_arm_and_its_skin_feel_the_person_come_nearer(runs):
+    recording = recording_of(runs, "panda_meets_person")
+    seen = recording.distance.status == Detection.DETECTED
+    assert {recording.layout.shapes[index] for index in recording.distance.shape[seen]} == {"doctor/body"}
+    assert seen[-1].all()
+    wrist = list(recording.layout.distance_sensors).index("wrist")
+    path = poses(recording, "doctor")[:, :2, 3]
+    reach = np.linalg.norm(path - poses(recording, "panda_link5")[:, :2, 3], axis=1)
+    near = recording.distance.distance[:, wrist] < reach  # she holds her arms out, towards the arm
+    assert near[seen[:, wrist]].all()
+    output = recording.capacitive.output_voltage[:, 0]
+    assert output[0] - output.min() > 0.1, "the skin's output falls"

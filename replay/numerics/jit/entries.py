@@ -83,7 +83,8 @@ def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: 
             where numba keeps kernels itself (`compiler.AVAILABLE`), since nobody knows what it has.
     """
     if not compiler.AVAILABLE:
-        remark(f"numba {numba.__version__} is not known from within ({compiler.TRIED[0]}x is): kernels compile slower")
+        known = f"({compiler.TRIED[0]}x is)"
+        remark(f"numba {numba.__version__} is not known from within {known}: kernels are the same, compiled slower")
     entries = [_Entry(kernel) for kernel in dict.fromkeys(kernels) if hasattr(kernel, "compile")]
     missing = [entry for entry in entries if compiler.AVAILABLE and not entry.is_ready]
     if missing:

@@ -7,13 +7,9 @@ projected on one plane have the ratio of the areas. The share with the smallest 
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.double_double import difference_of_products, two_sum
 from replay.numerics.jit import kernel
-
-Floats = NDArray[np.float64]
 
 SHARE_A, SHARE_B, SHARE_C, HEIGHT, EAST, WEST, NORTH, SOUTH = range(8)
 LOW = 4

@@ -5,13 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns, Field
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _CHART = "Capacitive sensors: drop of the output voltage [V]"
 

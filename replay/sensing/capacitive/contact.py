@@ -29,21 +29,19 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64
-from numpy.typing import NDArray
 
 from replay.geometry.containment import inside
 from replay.geometry.tree import TREE_TYPE, Tree
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.double_double import Pair, two_sum
 from replay.numerics.exact_sign import has_area, sign_of_determinant, sign_of_difference
 from replay.numerics.jit import entry, inlined_kernel, kernel
-from replay.sensing.capacitive.placed_plate import Triple
+from replay.numerics.triples import Triple
 
 CLEAR = 0
 TOUCHING = 1
 SATURATED = 2  # and touching
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Borders = tuple[Pair, Pair, Pair, Pair]
 Signs = tuple[int, int, int, int]
 

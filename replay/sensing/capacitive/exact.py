@@ -25,9 +25,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.double_double import difference_of_products
 from replay.numerics.inverse_distance import mean_over_triangle
 from replay.numerics.jit import kernel
@@ -46,8 +44,6 @@ from replay.sensing.capacitive.area_share import (
     share,
 )
 from replay.sensing.capacitive.contact import SATURATED, Borders, borders, contact
-
-Floats = NDArray[np.float64]
 
 NONE = -1
 _SEVERAL = 2

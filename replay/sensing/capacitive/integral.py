@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
+from replay.numerics.arrays import Floats
 from replay.numerics.exact_sign import area_or_zero
 from replay.numerics.jit import kernel
 from replay.sensing.capacitive.contact import SATURATED, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
 from replay.sensing.capacitive.placed_plate import beyond_borders
-
-Floats = NDArray[np.float64]
 
 SIDES = ("front", "both")
 METHODS = ("exact", "midpoint")

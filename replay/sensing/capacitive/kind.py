@@ -34,7 +34,7 @@ class Capacitive(SensorKind):
     name = "capacitive"
     part = CapacitiveSensorPart
     method = CapacitiveMethod
-    revisions: ClassVar = {"tree": 5, "exact": 4, "midpoint": 3, "bem": 1}
+    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "bem": 1}
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation
     expected = (

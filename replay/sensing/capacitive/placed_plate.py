@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats
 from replay.numerics.jit import inlined_kernel, kernel
+from replay.numerics.triples import Triple
 
-Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+Pose = tuple[Row, Row, Row]
+"""The first three rows of a transform, as numbers: kernels keep them in registers."""
 
 _ROUNDING = 1e-15
 """Rounding of a place in the plate's frame against that of the body."""
@@ -25,7 +25,7 @@ class PlacedPlate(NamedTuple):
     """A plate |x| <= hx, |y| <= hy, z = 0 in one pose, and which triangles of the body count.
 
     Attributes:
-        T_plate_body: (4, 4).
+        T_plate_body: three rows.
         half_x, half_y: hx and hy [m].
         both: whether what lies behind the plate, z < 0, counts too.
         facing: whether only triangles count whose outer side the plate's centre lies on.
@@ -35,7 +35,7 @@ class PlacedPlate(NamedTuple):
         blur: how far off a place in `Clusters.outlines` may be, seen from the plate [m].
     """
 
-    T_plate_body: Floats
+    T_plate_body: Pose
     half_x: float
     half_y: float
     both: bool
@@ -50,7 +50,6 @@ def placed_plate(
     T: Floats, half_x: float, half_y: float, both: bool, facing: bool, rounding: float, blur_of_body: float
 ) -> PlacedPlate:
     """Return a plate at T_plate_body; `blur_of_body` [m] is how far off places are in the body's frame."""
-    # not inlined: what returns an array has to count references
     centre = (
         -(T[0, 0] * T[0, 3] + T[1, 0] * T[1, 3] + T[2, 0] * T[2, 3]),
         -(T[0, 1] * T[0, 3] + T[1, 1] * T[1, 3] + T[2, 1] * T[2, 3]),
@@ -58,21 +57,26 @@ def placed_plate(
     )
     blur = blur_of_body + _ROUNDING * (abs(T[0, 3]) + abs(T[1, 3]) + abs(T[2, 3]))
     blur = max(blur, 2.0 * rounding)
-    return PlacedPlate(T, half_x, half_y, both, facing, centre, rounding, blur)
+    rows = (
+        (T[0, 0], T[0, 1], T[0, 2], T[0, 3]),
+        (T[1, 0], T[1, 1], T[1, 2], T[1, 3]),
+        (T[2, 0], T[2, 1], T[2, 2], T[2, 3]),
+    )
+    return PlacedPlate(rows, half_x, half_y, both, facing, centre, rounding, blur)
 
 
 @inlined_kernel
-def place(T: Floats, x: float, y: float, z: float) -> Triple:
+def place(T: Pose, x: float, y: float, z: float) -> Triple:
     """Return a point of the body in the plate's frame."""
     return (
-        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
-        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
-        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
+        T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3],
+        T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3],
+        T[2][0] * x + T[2][1] * y + T[2][2] * z + T[2][3],
     )
 
 
 @inlined_kernel
-def place_corner(T: Floats, rounding: float, x: float, y: float, z: float) -> Triple:
+def place_corner(T: Pose, rounding: float, x: float, y: float, z: float) -> Triple:
     """Return a corner in the plate's frame; one that is on z = 0 to rounding is on it."""
     corner = place(T, x, y, z)
     return corner[0], corner[1], corner[2] if abs(corner[2]) > rounding else 0.0

@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float, as_floats
+from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.integral import SIDES, check_half_size
 from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
-
-Floats = NDArray[np.float64]
 
 FACES = ("all", "facing")
 

@@ -14,6 +14,7 @@ from replay.geometry import tree
 from replay.kinematics.linkage import POSE_ROUNDING, LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arguments import as_float
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entries_of
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.contact import plates_inside
@@ -25,9 +26,6 @@ from replay.sensing.capacitive.tree.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
 from replay.sensing.target import Target
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 METHODS = ("tree", "exact", "midpoint")
 _LARGEST_EXPONENT = 500
@@ -96,6 +94,7 @@ class CapacitiveSuite:
         self._savings = savings
         self._splits = splits if method == "midpoint" else EXACT
         sensed = [any(sensor.senses(target.link) for sensor in self.sensors) for target in self.targets]
+        self._sizes = [float(np.max(np.abs(target.triangles), initial=0.0)) for target in self.targets]
         self._scales = [_power_of_two(target.triangles) for target in self.targets]
         self._triangles = [
             np.ascontiguousarray(scale * target.triangles, dtype=np.float64)
@@ -165,9 +164,8 @@ class CapacitiveSuite:
 
     def _rounding(self, sensor_index: int, target_index: int, way: Floats) -> Floats:
         """Return how far off places may be (n,) [m], of a way (n,) [m] between the links, see `LinkPoses.way`."""
-        size = float(np.max(np.abs(self.targets[target_index].triangles)))
         steps = max(float(np.abs(plate.T_link_plate[:3, 3]).sum()) for plate in self.sensors[sensor_index].plates)
-        return POSE_ROUNDING * (way + steps + size)
+        return POSE_ROUNDING * (way + steps + self._sizes[target_index])
 
     def _integrate(
         self, sensor_index: int, target_index: int, T_plate_body: Floats, rounding: Floats

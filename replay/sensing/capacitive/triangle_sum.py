@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import boolean, float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.double_double import two_sum
 from replay.numerics.exact_sign import area_or_zero
 from replay.numerics.jit import entry, kernel
@@ -13,9 +13,6 @@ from replay.sensing.capacitive.contact import CLEAR, contact
 from replay.sensing.capacitive.exact import SCRATCH, integral_over_triangle
 from replay.sensing.capacitive.integral import midpoint_over_triangle
 from replay.sensing.capacitive.placed_plate import faces_centre, place_triangle, placed_plate, write_triangle
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 EXACT = -1
 """As `splits`: the closed forms instead of the midpoint rule."""

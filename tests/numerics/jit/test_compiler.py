@@ -1,7 +1,11 @@
 """Kernels compiled by the way into numba and by its public decorator: the same results, and each where it belongs."""
 
 import gc
+import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -15,6 +19,7 @@ from replay.numerics.jit import compiler, kernel, leaf_kernel
 from replay.sensing.distance.bounds import box_bounds
 from replay.sensing.distance.cone import Cone
 
+ROOT = Path(__file__).parents[3]
 FAKED = "import numba\nnumba.__version__ = '0.99.0'\n"
 
 
@@ -44,6 +49,58 @@ def test_with_another_numba_kernels_are_compiled_by_its_public_decorator(package
     callee = (package.root / "geometry" / "callee.py").read_text()
     package.write("geometry/callee.py", callee.replace("1.0", "2.0"))
     assert package.run(hits) == "30.0 0"
+
+
+INTEGRALS = """
+import numpy as np
+from replay.numerics.inverse_distance import mean_over_triangle
+corners = np.random.default_rng(5).normal(size=(200, 3, 3)) * np.logspace(-9, 3, 200)[:, None, None]
+print([float(mean_over_triangle(*(tuple(corner) for corner in triangle))).hex() for triangle in corners.tolist()])
+"""
+
+RECORDING = """
+import sys
+from pathlib import Path
+from replay.recording.record import record
+from replay.scenario.load import load
+record(load(Path("tests/data/frozen/scene.yaml")), sys.argv[1], rrd=False)
+"""
+
+
+def said(code, cache, *arguments):
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, env={**os.environ, **cache}, capture_output=True, text=True, check=True, cwd=ROOT)
+    return done.stdout, [line for line in done.stderr.splitlines() if "compil" not in line or "slower" in line]
+
+
+def test_kernels_by_the_public_decorator_say_the_same_to_the_last_digit(tmp_path):
+    fast, _ = said(INTEGRALS, {})
+    slow, _ = said(FAKED + INTEGRALS, {"NUMBA_CACHE_DIR": str(tmp_path)})
+    assert list(tmp_path.rglob("*.nbc")), "numba has kept them itself"
+    assert slow == fast
+    assert fast.count("0x") == 200
+
+
+@pytest.mark.soak
+def test_a_recording_by_the_public_decorator_is_the_same_and_it_is_said(tmp_path):
+    """It takes minutes: everything is compiled for every caller anew."""
+    said(RECORDING, {}, str(tmp_path / "fast"))
+    prepared = "from replay.numerics.jit import compile_entries; compile_entries([])\n"
+    _, remarks = said(FAKED + prepared + RECORDING, {"NUMBA_CACHE_DIR": str(tmp_path)}, str(tmp_path / "slow"))
+    assert remarks == [
+        "replay: numba 0.99.0 is not known from within (0.68.x is): kernels are the same, compiled slower"
+    ]
+    fast, slow = ((tmp_path / name / "frozen.mcap").read_bytes() for name in ("fast", "slow"))
+    assert slow == fast
+
+
+def test_another_numba_is_said_before_anything_is_compiled(package):
+    package.write("collision/caller.py", FAKED + (package.root / "collision" / "caller.py").read_text())
+    process = package.start("from replay.numerics.jit import compile_entries; compile_entries([]); compile_entries([])")
+    _, errors = process.communicate()
+    assert errors.splitlines() == [
+        "replay: numba 0.99.0 is not known from within (0.68.x is): kernels are the same, compiled slower"
+    ]
 
 
 @leaf_kernel

@@ -10,13 +10,13 @@ from replay.sensing.capacitive.tree.clusters import make_clusters
 from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
+    CORNER5,
+    EDGE5,
     FOURTH,
     HALF,
     MEAN2,
-    MEAN5,
     MEAN6,
     MIDDLE,
-    ODD5,
     RADIUS,
     SECOND,
     SIGMA,
@@ -77,6 +77,15 @@ def test_the_error_never_exceeds_the_tolerance(body, lowest, highest, both, faci
         assert (bound[finite] <= rtol * expected * (1.0 + rtol)).all()
 
 
+def _sphere():
+    """Directions (128, 3) and weights of a rule on the sphere that is exact up to degree 15."""
+    heights, weights = np.polynomial.legendre.leggauss(8)
+    angles = (np.arange(16) + 0.5) * np.pi / 8.0
+    x, y = np.outer(np.sqrt(1.0 - heights**2), np.cos(angles)), np.outer(np.sqrt(1.0 - heights**2), np.sin(angles))
+    directions = np.stack([x, y, np.repeat(heights[:, None], 16, axis=1)], axis=-1).reshape(-1, 3)
+    return directions, np.repeat(weights, 16) / 32.0
+
+
 def test_moments_are_those_of_the_triangles(body):
     tree = triangle_tree(body)
     clusters = make_clusters(body, tree)
@@ -94,9 +103,18 @@ def test_moments_are_those_of_the_triangles(body):
         scale = (weights * squares).sum()
         assert clusters.nodes[node, AREA] == pytest.approx(areas.sum(), rel=1e-12)
         assert clusters.nodes[node, MEAN6] == pytest.approx((weights * squares**3).sum(), rel=8e-2)
-        assert clusters.nodes[node, MEAN5] >= (weights * squares**2.5).sum()
+        mean5 = np.sqrt((weights * squares**2).sum() * (weights * squares**3).sum())
         fifth = np.einsum("np,npa,npb,npc,npd,npe->abcde", weights, *[points] * 5)
-        assert clusters.nodes[node, ODD5] == pytest.approx(np.sqrt((fifth**2).sum()), abs=3e-2 * scale**2.5)
+        edge = min(np.sqrt(4.203125 * (fifth**2).sum()), mean5)
+        assert clusters.nodes[node, EDGE5] == pytest.approx(edge, abs=6e-2 * scale**2.5)
+        # order 5 is a harmonic in the direction of the plate: the mean of its square tells how large it may be
+        directions, shares = _sphere()
+        along = points @ directions.T
+        order5 = (63.0 * along**5 - 70.0 * along**3 * squares[..., None] + 15.0 * along * squares[..., None] ** 2) / 8.0
+        order5 = (weights[..., None] * order5).sum(axis=(0, 1))
+        corner = min(np.sqrt(11.0 * (shares * order5**2).sum()), mean5)
+        assert clusters.nodes[node, CORNER5] == pytest.approx(corner, abs=6e-2 * scale**2.5)
+        assert np.abs(order5).max() <= clusters.nodes[node, CORNER5] + 6e-2 * scale**2.5
         xy = clusters.moments[node, SECOND + 3]
         assert xy == pytest.approx((weights * points[..., 0] * points[..., 1]).sum(), abs=2e-2 * scale)
         xxxx = clusters.moments[node, FOURTH]
@@ -119,7 +137,7 @@ def test_outlines_are_rounded_to_the_safe_side(body):
     nodes, outlines = clusters.nodes, clusters.outlines.astype(float)
     for column, size in ((RADIUS, nodes[:, RADIUS]), (MEAN2, nodes[:, MEAN2])):
         assert (outlines[:, column] >= size).all()
-    for column in (ODD5, MEAN5, MEAN6):
+    for column in (CORNER5, EDGE5, MEAN6):
         assert (outlines[:, column] >= nodes[:, AREA] * nodes[:, column]).all()
     assert (outlines[:, AREA] <= nodes[:, AREA]).all()
     matrices = clusters.moments[:, [SECOND + k for k in (0, 3, 4, 3, 1, 5, 4, 5, 2)]].reshape(-1, 3, 3)

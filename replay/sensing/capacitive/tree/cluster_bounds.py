@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats, Integers, Singles
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, beyond_borders, region_of
+from replay.numerics.triples import Triple
+from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place, region_of
 from replay.sensing.capacitive.tree.lanes import load, padded
 from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
+    CORNER5,
     DROP,
+    EDGE5,
     ERROR,
     FARTHEST_PLANE,
     FOUND,
@@ -22,12 +23,10 @@ from replay.sensing.capacitive.tree.registers import (
     LANES,
     LEAST,
     MEAN2,
-    MEAN5,
     MEAN6,
     MIDDLE,
     NEAREST_PLANE,
     NORMAL,
-    ODD5,
     OPEN,
     OPENING,
     OUTLINE_COLUMNS,
@@ -38,18 +37,11 @@ from replay.sensing.capacitive.tree.registers import (
     VERDICT,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Singles = NDArray[np.float32]
-
 CLOSEST = 1.5
 """Nodes and triangles nearer than so many of their radii are not expanded."""
 
 _MORE, _LEAST_AREA = 1.0 + 2.0**-22, 1e-37
 """An area in half the digits, rounded down, is less than it is by no more than these factor and sum [m^2]."""
-
-_FIFTH = (math.sqrt(7.875), math.sqrt(4.203125), 1.0)
-"""Frobenius norm of the form |Pd|^5 P_5(cos) when P drops none, one or two of three components."""
 
 
 @inlined_kernel
@@ -61,25 +53,10 @@ def _reaches(e: Triple, middle: Triple, half: Triple, radius: float) -> tuple[fl
 
 
 @inlined_kernel
-def _spread(sigma: float, up: float, down: float, blur: float) -> float:
-    """Return a bound of the standard deviation along an axis [m], of points of a mean that reach so far up and down."""
-    return min(sigma, math.sqrt(max((up + blur) * (down + blur), 0.0)))
-
-
-@inlined_kernel
-def _over(reach: float, gap: float, sigma: float, blur: float) -> float:
-    """Return a bound of mean(w^2) [m^2], w the depth by which a node that reaches so far lies over a border."""
-    depth = max(reach - gap, 0.0)
-    ratio = depth / reach if reach > 0.0 else 0.0
-    w = min(depth, sigma * ratio) + blur
-    return w * w if reach + blur > gap else 0.0
-
-
-@inlined_kernel
 def _over_borders(
     position: float, half: float, up: float, down: float, sigma: float, blur: float
 ) -> tuple[float, float]:
-    """Return bounds of mean(w^2) [m^2] across one axis.
+    """Return bounds of mean(w^2) [m^2] across one axis, w the depth over a border.
 
     First for a border that the centroid is beyond (the integral may be larger than the expansion says), then for the
     borders that it is within (it may be smaller).
@@ -87,22 +64,47 @@ def _over_borders(
     # as if the centroid were on the positive side
     ahead, back = up if position >= 0.0 else down, down if position >= 0.0 else up
     gap = half - abs(position)
-    near = _over(ahead if gap >= 0.0 else back, abs(gap), sigma, blur)
-    opposite = _over(back, half + abs(position), sigma, blur)
-    return near if gap < 0.0 else 0.0, opposite + (near if gap >= 0.0 else 0.0)
+    reach = max(ahead if gap >= 0.0 else back, 0.0)
+    opposite = max(back, 0.0)
+    square = blur * blur
+    variance = min(sigma * sigma, max((up + blur) * (down + blur), 0.0)) + square
+    # V D^2 / (R^2 + V) for both, by one division
+    first, second = reach * reach + variance, opposite * opposite + variance
+    share = variance / (first * second)
+    depth, beyond = max(reach - abs(gap) + 2.0 * blur, 0.0), max(opposite - half - abs(position) + 2.0 * blur, 0.0)
+    near = depth * depth * second * share + (square if depth > 0.0 else 0.0)
+    far = beyond * beyond * first * share + (square if beyond > 0.0 else 0.0)
+    return near if gap < 0.0 else 0.0, far + (near if gap >= 0.0 else 0.0)
 
 
 @leaf_kernel
-def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+def judge_sides(outlines: Singles, which: Integers, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+    """Write on which side of z = 0 the nodes which[:count] are: verdicts DROP behind, KEEP before, OPEN across it."""
+    T, blur = plate.T_plate_body, plate.blur
+    load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
+    for i in range(padded(count)):
+        a, b, c = (
+            lanes[CENTROID * LANES + i],
+            lanes[(CENTROID + 1) * LANES + i],
+            lanes[(CENTROID + 2) * LANES + i],
+        )
+        z = place(T, a, b, c)[2]
+        middle = (lanes[MIDDLE * LANES + i], lanes[(MIDDLE + 1) * LANES + i], lanes[(MIDDLE + 2) * LANES + i])
+        half = (lanes[HALF * LANES + i], lanes[(HALF + 1) * LANES + i], lanes[(HALF + 2) * LANES + i])
+        above, below = _reaches(T[2][:3], middle, half, lanes[RADIUS * LANES + i])
+        verdict = 0.0 if z - below <= blur else 1.0
+        lanes[VERDICT * LANES + i] = -1.0 if z + above < -blur else verdict
+
+
+@leaf_kernel
+def judge_nodes(outlines: Singles, which: Integers, count: int, plate: PlacedPlate, lanes: Floats) -> None:
     """Write what is found of the nodes which[:count], and the verdict on each, to the lanes.
 
     Places may be off by the plate's `blur`; the distance that is computed with is a lower bound.
     """
     T, half_x, half_y, both, blur = plate.T_plate_body, plate.half_x, plate.half_y, plate.both, plate.blur
     load(outlines, OUTLINE_COLUMNS, which, count, lanes, 0)
-    # taken out of the loop by hand: the compiler cannot know that lanes and pose are different memory
-    ex, ey, ez = (T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2])
-    tx, ty, tz = T[0, 3], T[1, 3], T[2, 3]
+    ex, ey, ez = T[0][:3], T[1][:3], T[2][:3]
     for i in range(padded(count)):
         a, b, c = (
             lanes[CENTROID * LANES + i],
@@ -110,12 +112,11 @@ def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, 
             lanes[(CENTROID + 2) * LANES + i],
         )
         h, area, sigma = lanes[RADIUS * LANES + i], lanes[AREA * LANES + i], lanes[SIGMA * LANES + i]
+        corner5, edge5 = lanes[CORNER5 * LANES + i], lanes[EDGE5 * LANES + i]
         middle = (lanes[MIDDLE * LANES + i], lanes[(MIDDLE + 1) * LANES + i], lanes[(MIDDLE + 2) * LANES + i])
         half = (lanes[HALF * LANES + i], lanes[(HALF + 1) * LANES + i], lanes[(HALF + 2) * LANES + i])
         # where the node lies, and the verdict
-        x = ex[0] * a + ex[1] * b + ex[2] * c + tx
-        y = ey[0] * a + ey[1] * b + ey[2] * c + ty
-        z = ez[0] * a + ez[1] * b + ez[2] * c + tz
+        x, y, z = place(T, a, b, c)
         above, below = _reaches(ez, middle, half, h)
         beyond_x, beyond_y = beyond_borders(x, y, half_x, half_y)
         r = math.sqrt(beyond_x * beyond_x + beyond_y * beyond_y + z * z) - blur
@@ -123,17 +124,16 @@ def judge_nodes(outlines: Singles, which: Ints, count: int, plate: PlacedPlate, 
         verdict = 0.0 if not both and z - below <= blur else verdict
         verdict = -1.0 if not both and z + above < -blur else verdict
         # what the expansion leaves out
-        inverse, nearest = 1.0 / r, 1.0 / (r - h)
+        both_inverse = 1.0 / (r * (r - h))
+        inverse, nearest = (r - h) * both_inverse, r * both_inverse
         cube = inverse * inverse * inverse
-        fifth = _FIFTH[0] if beyond_x > 0.0 else _FIFTH[1]
-        fifth = fifth if beyond_y > 0.0 else (_FIFTH[1] if beyond_x > 0.0 else _FIFTH[2])
-        odd = min(fifth * lanes[ODD5 * LANES + i], lanes[MEAN5 * LANES + i])
+        odd = corner5 if min(beyond_x, beyond_y) > 0.0 else edge5
         error = cube * cube * (odd + lanes[MEAN6 * LANES + i] * nearest)
         # what lies over the borders
         up, down = _reaches(ex, middle, half, h)
-        more_x, less_x = _over_borders(x, half_x, up, down, _spread(sigma, up, down, blur), blur)
+        more_x, less_x = _over_borders(x, half_x, up, down, sigma, blur)
         up, down = _reaches(ey, middle, half, h)
-        more_y, less_y = _over_borders(y, half_y, up, down, _spread(sigma, up, down, blur), blur)
+        more_y, less_y = _over_borders(y, half_y, up, down, sigma, blur)
         factor = 0.25 * (area * _MORE + _LEAST_AREA) * nearest * nearest * nearest
         # 1/sqrt(1 + t) >= 1 - t/2, and r may be short by 2 blur
         part = 1.0 - inverse * (2.0 * blur + 0.5 * lanes[MEAN2 * LANES + i] * inverse)

@@ -10,25 +10,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import float32, float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.tree import Tree
+from replay.numerics.arrays import Floats, Integers, Singles
 from replay.numerics.jit import entry, kernel, leaf_kernel, record
 from replay.sensing.capacitive.tree.moments import gather_moments
 from replay.sensing.capacitive.tree.registers import (
     AREA,
     CENTROID,
+    CORNER5,
+    EDGE5,
     FARTHEST_PLANE,
     HALF,
     MEAN2,
-    MEAN5,
     MEAN6,
     MIDDLE,
     MOMENT_COLUMNS,
     NEAREST_PLANE,
     NORMAL,
     NUMBER,
-    ODD5,
     OPENING,
     OUTLINE_COLUMNS,
     PLACE,
@@ -43,10 +43,6 @@ from replay.sensing.capacitive.tree.registers import (
     WHOLE,
 )
 from replay.sensing.capacitive.triangle_sum import triangle_areas
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Singles = NDArray[np.float32]
 
 _LINE = 64
 """[bytes] what a processor reads of its memory at a time; rows begin on such a line."""
@@ -65,7 +61,7 @@ class Clusters(NamedTuple):
     outlines: Singles  # (m, 16)
     blur: float  # [m]
     moments: Floats  # (m, 40) [m^2, m^3, m^4], means over the area about the centroid
-    links: Ints  # (m, 4) of the tree: second child, or -1, first triangle and one beyond the last
+    links: Integers  # (m, 4) of the tree
 
 
 CLUSTERS_TYPE = record(
@@ -92,7 +88,8 @@ def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
     _enclose(ordered, areas, tree.begin, tree.end, nodes)
     moments[:, WHOLE], moments[:, PLACE : PLACE + 3] = nodes[:, AREA], nodes[:, CENTROID:RADIUS]
     moments[:, NUMBER] = tree.end - tree.begin
-    links = np.ascontiguousarray(np.stack([tree.second, tree.begin, tree.end, tree.end], axis=1))
+    after = np.where(tree.second < 0, -1, tree.second[tree.second])
+    links = np.ascontiguousarray(np.stack([tree.second, tree.begin, tree.end, after], axis=1))
     with np.errstate(over="ignore", under="ignore"):
         outlines = _outlines(tree, nodes, moments)
     # a place is off by half a bit in 24, a box relative to it as well and twice as large, in three directions
@@ -112,7 +109,7 @@ def _outlines(tree: Tree, nodes: Floats, moments: Floats) -> Singles:
     area = nodes[:, AREA]
     sizes = np.zeros((len(nodes), OUTLINE_COLUMNS))
     sizes[:, RADIUS], sizes[:, MEAN2] = nodes[:, RADIUS], nodes[:, MEAN2]
-    for column in (ODD5, MEAN5, MEAN6):
+    for column in (CORNER5, EDGE5, MEAN6):
         sizes[:, column] = area * nodes[:, column]
     sizes[:, HALF:SIGMA] = 0.5 * tree.upper - 0.5 * tree.lower
     sizes[:, SIGMA] = np.sqrt(_largest_variance(moments[:, SECOND:THIRD]))
@@ -141,7 +138,7 @@ def _largest_variance(second: Floats) -> Floats:
 
 @entry(float64[:, :, ::1], float64[::1], int64[::1], int64[::1], float64[:, ::1])
 @kernel
-def _enclose(triangles: Floats, areas: Floats, begin: Ints, end: Ints, nodes: Floats) -> None:
+def _enclose(triangles: Floats, areas: Floats, begin: Integers, end: Integers, nodes: Floats) -> None:
     """Write radii, cones of normals and the planes' offsets of all nodes."""
     unit = np.zeros((len(triangles), 3))
     for k in range(len(triangles)):

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 from replay.numerics.log_difference import mean_inverse_linear
 from replay.sensing.capacitive.contact import CLEAR, contact, may_touch
 from replay.sensing.capacitive.exact import integral_over_triangle
 from replay.sensing.capacitive.placed_plate import PlacedPlate, faces_centre, place_triangle, write_triangle
 from replay.sensing.capacitive.tree.lanes import load, padded
-from replay.sensing.capacitive.tree.part_sum import TRIANGLE_3, sum_by_points
+from replay.sensing.capacitive.tree.part_sum import sum_by_points
 from replay.sensing.capacitive.tree.registers import (
     ALLOWED,
     CORNERS,
@@ -45,17 +42,18 @@ from replay.sensing.capacitive.tree.registers import (
 from replay.sensing.capacitive.tree.triangle_bounds import judge_loaded
 from replay.sensing.capacitive.tree.triangle_pieces import MOST_PIECES, Pieces, cut, quarter, write_piece
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 IN_FOUR = 2
 """How a piece is cut that no border runs through."""
+
+
+_THIRD = 1.0 / 3.0
+_IDENTITY = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 
 
 @leaf_kernel
 def sum_hard(
     triangles: Floats,
-    hard: Ints,
+    hard: Integers,
     begin: int,
     count: int,
     plate: PlacedPlate,
@@ -160,7 +158,7 @@ def _border_across(plate: PlacedPlate, lanes: Floats, i: int) -> int:
 def _sum_pieces(pieces: Pieces, plate: PlacedPlate, size: int, lanes: Floats) -> None:
     """Sum the pieces in the pool by point rules, cutting them as long as that pays; `made` tells who was given up."""
     # pieces are in the plate's frame, and what did not count is cut off
-    here = PlacedPlate(pieces.identity, plate.half_x, plate.half_y, True, False, (0.0, 0.0, 0.0), 0.0, 0.0)
+    here = PlacedPlate(_IDENTITY, plate.half_x, plate.half_y, True, False, (0.0, 0.0, 0.0), 0.0, 0.0)
     pool, in_done, rows, made = pieces.pool, pieces.in_done, pieces.rows, pieces.made
     in_done[:] = 0
     while size > 0:
@@ -213,13 +211,10 @@ def _measure(count: int, lanes: Floats) -> None:
     """Write what a row of `Clusters.triangles` says of a triangle beside corners and area, from these."""
     for i in range(padded(count)):
         largest, squares = 0.0, 0.0
-        x = (lanes[CORNERS * LANES + i] + lanes[(CORNERS + 3) * LANES + i] + lanes[(CORNERS + 6) * LANES + i]) / 3.0
-        y = (
-            lanes[(CORNERS + 1) * LANES + i] + lanes[(CORNERS + 4) * LANES + i] + lanes[(CORNERS + 7) * LANES + i]
-        ) / 3.0
-        z = (
-            lanes[(CORNERS + 2) * LANES + i] + lanes[(CORNERS + 5) * LANES + i] + lanes[(CORNERS + 8) * LANES + i]
-        ) / 3.0
+        x = lanes[CORNERS * LANES + i] + lanes[(CORNERS + 3) * LANES + i] + lanes[(CORNERS + 6) * LANES + i]
+        y = lanes[(CORNERS + 1) * LANES + i] + lanes[(CORNERS + 4) * LANES + i] + lanes[(CORNERS + 7) * LANES + i]
+        z = lanes[(CORNERS + 2) * LANES + i] + lanes[(CORNERS + 5) * LANES + i] + lanes[(CORNERS + 8) * LANES + i]
+        x, y, z = _THIRD * x, _THIRD * y, _THIRD * z
         for corner in range(3):
             dx = lanes[(CORNERS + 3 * corner) * LANES + i] - x
             dy = lanes[(CORNERS + 3 * corner + 1) * LANES + i] - y
@@ -227,7 +222,7 @@ def _measure(count: int, lanes: Floats) -> None:
             square = dx * dx + dy * dy + dz * dz
             squares += square
             largest = max(largest, square)
-        lanes[REACH * LANES + i], lanes[SPREAD * LANES + i] = math.sqrt(largest), squares / 12.0
+        lanes[REACH * LANES + i], lanes[SPREAD * LANES + i] = math.sqrt(largest), squares * (1.0 / 12.0)
 
 
 @inlined_kernel
@@ -249,7 +244,9 @@ def _sum_done(pieces: Pieces, plate: PlacedPlate, kind: int, lanes: Floats) -> N
     for i in range(count):
         pieces.rows[i] = first + i
     load(pieces.done[kind], PIECE_COLUMNS, pieces.rows, count, lanes, 0)
-    points = TRIANGLE_3 if kind == 0 else (TRIANGLE_7 if kind == 1 else TRIANGLE_16)
-    sum_by_points(points, count, plate, PIECE_REGION, PIECE_SHIFT, lanes)
+    for i in range(count):
+        lanes[(FOUND + REGION) * LANES + i] = lanes[PIECE_REGION * LANES + i]
+        lanes[(FOUND + SHIFT) * LANES + i] = lanes[PIECE_SHIFT * LANES + i]
+    sum_by_points(POINTS_3 + kind, count, plate, lanes)
     for i in range(count):
         pieces.totals[int(lanes[OWNER * LANES + i])] += lanes[SUM * LANES + i]

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.gather import transpose_four
 from replay.numerics.jit import inlined_kernel
-from replay.sensing.capacitive.placed_plate import Triple, place_corner
+from replay.numerics.triples import Triple
+from replay.sensing.capacitive.placed_plate import Pose, place_corner
 from replay.sensing.capacitive.tree.registers import CORNERS, LANES
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.floating[Any]]
-Ints = NDArray[np.int64]
 
 
 @inlined_kernel
@@ -29,7 +29,7 @@ def padded(count: int) -> int:
 
 
 @inlined_kernel
-def load(rows: Rows, columns: int, which: Ints, count: int, lanes: Floats, at: int) -> None:
+def load(rows: Rows, columns: int, which: Integers, count: int, lanes: Floats, at: int) -> None:
     """Write the first columns, in fours, of the rows which[:count] to the lanes, from column `at` on.
 
     `which` is filled up with its last one, to a multiple of four.
@@ -42,7 +42,7 @@ def load(rows: Rows, columns: int, which: Ints, count: int, lanes: Floats, at: i
 
 
 @inlined_kernel
-def corner_in_lanes(T: Floats, rounding: float, lanes: Floats, corner: int, i: int) -> Triple:
+def corner_in_lanes(T: Pose, rounding: float, lanes: Floats, corner: int, i: int) -> Triple:
     """Return a corner of the triangle in lane i, in the plate's frame."""
     at = CORNERS + 3 * corner
     return place_corner(T, rounding, lanes[at * LANES + i], lanes[(at + 1) * LANES + i], lanes[(at + 2) * LANES + i])

@@ -14,17 +14,20 @@ import math
 
 import numpy as np
 from numba import float64, int64
-from numpy.typing import NDArray
 
 from replay.geometry.tree import MAX_DEPTH
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.gauss import TRIANGLE_16
-from replay.numerics.jit import entry, kernel, leaf_kernel
-from replay.sensing.capacitive.tree.registers import AREA, KEPT, MEAN2, MEAN5, MEAN6, ODD5
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from replay.numerics.jit import entry, inlined_kernel, kernel, leaf_kernel
+from replay.sensing.capacitive.tree.registers import AREA, CORNER5, EDGE5, KEPT, MEAN2, MEAN6
 
 DEGREE = 6
+
+_FIFTH_CORNER, _FIFTH_EDGE = 7.875, 4.203125
+"""Squares of the Frobenius norms of the form |Pd|^5 P_5(cos), where P drops none or one of three components."""
+
+_ROUNDING = 1e-14
+"""Of a square of norms."""
 
 
 @leaf_kernel
@@ -89,9 +92,9 @@ def gather_moments(
     triangles: Floats,
     areas: Floats,
     centroids: Floats,
-    second: Ints,
-    begin: Ints,
-    end: Ints,
+    second: Integers,
+    begin: Integers,
+    end: Integers,
     nodes: Floats,
     moments: Floats,
 ) -> None:
@@ -136,7 +139,8 @@ def _summarise(cube: Floats, node: Floats, moments: Floats) -> None:
     area = node[AREA]
     for k in range(len(KEPT)):
         moments[k] = cube[KEPT[k, 0], KEPT[k, 1], KEPT[k, 2]] / area
-    mean2, mean4, mean6, square5 = 0.0, 0.0, 0.0, 0.0
+    mean2 = (cube[2, 0, 0] + cube[0, 2, 0] + cube[0, 0, 2]) / area
+    mean4, mean6 = 0.0, 0.0
     for i in range(4):
         for j in range(4 - i):
             k = 3 - i - j
@@ -146,14 +150,28 @@ def _summarise(cube: Floats, node: Floats, moments: Floats) -> None:
         for j in range(3 - i):
             k = 2 - i - j
             mean4 += _multinomial(i, j, k) * cube[2 * i, 2 * j, 2 * k] / area
+    mean5 = math.sqrt(mean4) * math.sqrt(mean6)  # |d|^5 = |d|^2 |d|^3, by Cauchy and Schwarz
+    # squares of the norms of the mean of d d d d d and of its traces, of degree 3 and 1
+    square5, square3, square1 = 0.0, 0.0, 0.0
     for i in range(6):
         for j in range(6 - i):
-            k = 5 - i - j
-            square5 += _multinomial(i, j, k) * (cube[i, j, k] / area) ** 2
-    mean2 = (cube[2, 0, 0] + cube[0, 2, 0] + cube[0, 0, 2]) / area
+            square5 += _multinomial(i, j, 5 - i - j) * (cube[i, j, 5 - i - j] / area) ** 2
+    for i in range(4):
+        for j in range(4 - i):
+            square3 += _multinomial(i, j, 3 - i - j) * (_trace(cube, i, j, 3 - i - j) / area) ** 2
+    for axis in range(3):
+        i, j, k = 1 if axis == 0 else 0, 1 if axis == 1 else 0, 1 if axis == 2 else 0
+        square1 += ((_trace(cube, i + 2, j, k) + _trace(cube, i, j + 2, k) + _trace(cube, i, j, k + 2)) / area) ** 2
+    traceless = max(square5 - 10.0 / 9.0 * square3 + 5.0 / 21.0 * square1, 0.0) + _ROUNDING * square5
     node[MEAN2], node[MEAN6] = mean2, mean6
-    node[MEAN5] = math.sqrt(mean4) * math.sqrt(mean6)  # |d|^5 = |d|^2 |d|^3, by Cauchy and Schwarz
-    node[ODD5] = math.sqrt(square5)
+    node[CORNER5] = min(math.sqrt(_FIFTH_CORNER * traceless), mean5)
+    node[EDGE5] = min(math.sqrt(_FIFTH_EDGE * square5), mean5)
+
+
+@inlined_kernel
+def _trace(cube: Floats, i: int, j: int, k: int) -> float:
+    """Return the integral of x^i y^j z^k |d|^2."""
+    return cube[i + 2, j, k] + cube[i, j + 2, k] + cube[i, j, k + 2]  # type: ignore[no-any-return]
 
 
 @leaf_kernel

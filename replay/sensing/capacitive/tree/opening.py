@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, leaf_kernel
 from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.placed_plate import PlacedPlate, beyond_borders, place
-from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes
+from replay.sensing.capacitive.placed_plate import PlacedPlate, place
+from replay.sensing.capacitive.tree.budget import Budget, SumTally, is_met
+from replay.sensing.capacitive.tree.cluster_bounds import faces, judge_nodes, judge_sides
 from replay.sensing.capacitive.tree.clusters import Clusters
 from replay.sensing.capacitive.tree.parts import Room, doubt_and_least, pop, push
 from replay.sensing.capacitive.tree.registers import (
+    ABOVE,
     ALLOWED,
-    AREA,
     BEGIN,
-    CENTROID,
     CLUSTER,
-    DROP,
     END,
     ERROR,
     FIRST_RULE,
@@ -29,88 +25,70 @@ from replay.sensing.capacitive.tree.registers import (
     KEEP,
     LANES,
     LEAST,
-    MEAN2,
+    LINE,
+    MOMENT_COLUMNS,
+    OPEN,
     PART,
     POINTS_1,
     RULE,
     RULE_FOUND,
     SECOND_CHILD,
+    SECOND_OF_SECOND,
     VERDICT,
 )
 from replay.sensing.capacitive.tree.triangle_bounds import judge_triangles
-
-Floats = NDArray[np.float64]
 
 _EFFORT_RULE = 0.5
 """What it costs to take a triangle's next rule, against opening a node."""
 
 
-_FIRST_PARTS = 100.0
-"""A part with more than this fraction of the whole error is opened before the errors are compared."""
+_TWO_LEVELS = 16.0
+"""A node whose error is so many times what is allowed is opened two levels at once: an error falls by a factor of 2 to
+11 from a node to its children."""
 
 
-class Budget(NamedTuple):
-    """What is asked of a sum.
+@leaf_kernel
+def split_at_plane(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[int, int, int]:
+    """Put the nodes before the plate on the stack, and the triangles of leaves across z = 0 on the list of tasks.
 
-    Attributes:
-        rtol: largest relative error.
-        first: a part with a larger error is opened before the errors are compared [m].
-        scale: brings the errors of parts to the order of 1 at most [1/m].
+    What is across has to be opened, whatever its error. Returns how many nodes are on the stack, how many triangles
+    wait to be judged, and how many nodes were looked at.
     """
-
-    rtol: float
-    first: float
-    scale: float
-
-
-class SumTally(NamedTuple):
-    """What is known of a sum.
-
-    Attributes:
-        done: sum over the triangles without a rule, as far as they are summed [m].
-        spent: bound of the error of `done` [m].
-        least: lower bound of the whole sum [m].
-        doubt: sum of the error bounds of the parts in the queue [m].
-    """
-
-    done: float
-    spent: float
-    least: float
-    doubt: float
-
-
-@inlined_kernel
-def budget_of(nodes: Floats, plate: PlacedPlate, rtol: float) -> Budget:
-    """Return the budget of a sum over all of a body's `Clusters.nodes`."""
-    ceiling = rtol * _least_of_root(nodes, plate)
-    return Budget(rtol, ceiling / _FIRST_PARTS, 1.0 / ceiling if ceiling > 0.0 else 1.0)
-
-
-@inlined_kernel
-def is_met(budget: Budget, tally: SumTally) -> bool:
-    """Return whether the error bounds are small enough."""
-    return tally.doubt + tally.spent <= budget.rtol * tally.least
-
-
-@inlined_kernel
-def _least_of_root(nodes: Floats, plate: PlacedPlate) -> float:
-    """Return a lower bound of the integral over all triangles [m], by Jensen."""
-    x, y, z = place(plate.T_plate_body, nodes[0, CENTROID], nodes[0, CENTROID + 1], nodes[0, CENTROID + 2])
-    u, v = beyond_borders(x, y, plate.half_x, plate.half_y)
-    square = u * u + v * v + z * z + nodes[0, MEAN2]
-    return nodes[0, AREA] / math.sqrt(square) if square > 0.0 else 0.0
+    stack, across, batch, openers, lanes = room.stack, room.across, room.batch, room.openers, room.lanes
+    stack[0], across[0] = 0, 0
+    if plate.both:
+        return 1, 0, 0
+    left, size, waiting, seen = 1, 0, 0, 0
+    while left > 0:
+        count = min(left, LANES)
+        left -= count
+        seen += count
+        for i in range(count):
+            batch[i] = across[left + i]
+        judge_sides(clusters.outlines, batch, count, plate, lanes)
+        opened = 0
+        for i in range(count):
+            verdict = lanes[VERDICT * LANES + i]
+            stack[size], openers[opened] = batch[i], batch[i]
+            size += verdict > 0.0
+            opened += verdict == 0.0
+        for k in range(opened):
+            left, waiting = _put_parts(clusters, room, across, openers[k], False, left, waiting)
+    return size, waiting, seen
 
 
 @leaf_kernel
 def refine(
-    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, tally: SumTally
+    clusters: Clusters, plate: PlacedPlate, budget: Budget, room: Room, size: int, waiting: int, tally: SumTally
 ) -> tuple[int, float, int, SumTally]:
-    """Judge the `size` nodes on the stack, and open the worst parts until the sum is good enough or a triangle is hard.
+    """Judge the nodes on the stack and the triangles that wait, `size` and `waiting` many, and open the worst parts.
+
+    It ends when the sum is good enough or a triangle is hard.
 
     Returns how many hard triangles, those without a rule, now are in `room.hard`, 0 when the parts are good enough; a
     lower bound of what these bring [m]; how many nodes were judged; and the tally.
     """
-    waiting, judged = 0, 0
+    judged = 0
     limit = allowed = budget.first
     while True:
         waiting, opened, tally = _settle_nodes(clusters, plate, room, size, waiting, limit, budget.scale, tally)
@@ -130,7 +108,7 @@ def refine(
         allowed = 0.5 * limit
 
 
-@inlined_kernel
+@leaf_kernel
 def _settle_nodes(
     clusters: Clusters,
     plate: PlacedPlate,
@@ -146,6 +124,7 @@ def _settle_nodes(
     Returns how many triangles wait to be judged, how many nodes were judged, and the tally.
     """
     stack, batch, lanes = room.stack, room.batch, room.lanes
+    keepers, openers = room.keepers, room.openers
     judged, least, doubt = 0, tally.least, tally.doubt
     while size > 0:
         count = min(size, LANES)
@@ -154,26 +133,37 @@ def _settle_nodes(
         for i in range(count):
             batch[i] = stack[size + i]
         judge_nodes(clusters.outlines, batch, count, plate, lanes)
+        # told apart without branches, which no processor could foresee
+        kept, opened = 0, 0
         for i in range(count):
-            node, verdict, error = batch[i], lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
-            if verdict < 0.0:
+            verdict = lanes[VERDICT * LANES + i]
+            keep = (verdict > 0.0) & (lanes[(FOUND + ERROR) * LANES + i] <= limit)
+            keepers[kept], openers[opened] = i, i
+            kept += keep
+            opened += (verdict >= 0.0) & (not keep)
+        for k in range(kept):
+            i = keepers[k]
+            node, error = batch[i], lanes[(FOUND + ERROR) * LANES + i]
+            side = faces(clusters.nodes, node, plate.centre) if plate.facing else KEEP
+            if side == OPEN:
+                openers[opened] = i
+                opened += 1
+            if side != KEEP:
                 continue
-            keep = (verdict > 0.0) & (error <= limit)
-            if keep and plate.facing:
-                side = faces(clusters.nodes, node, plate.centre)
-                if side == DROP:
-                    continue
-                keep = side == KEEP
-            if keep:
-                push(room.queue, node, CLUSTER, lanes, i, error * scale)
-                least += lanes[(FOUND + LEAST) * LANES + i]
-                doubt += error
-            else:
-                size, waiting = _put_parts(clusters, room, node, size, waiting)
+            push(room.queue, node, CLUSTER, lanes, i, error * scale)
+            for line in range(0, MOMENT_COLUMNS, LINE):
+                prefetch(clusters.moments, node, line)
+            least += lanes[(FOUND + LEAST) * LANES + i]
+            doubt += error
+        for k in range(opened):
+            i = openers[k]
+            # far too much of an error is too much for children, too
+            far_off = (lanes[VERDICT * LANES + i] == 0.0) | (lanes[(FOUND + ERROR) * LANES + i] > _TWO_LEVELS * limit)
+            size, waiting = _put_parts(clusters, room, stack, batch[i], far_off, size, waiting)
     return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
-@inlined_kernel
+@leaf_kernel
 def _settle_triangles(
     triangles: Floats, plate: PlacedPlate, room: Room, waiting: int, allowed: float, scale: float, tally: SumTally
 ) -> tuple[int, float, SumTally]:
@@ -183,11 +173,15 @@ def _settle_triangles(
     """
     tasks, firsts, batch, lanes = room.tasks, room.firsts, room.batch, room.lanes
     hard, in_hard, least, doubt = 0, 0.0, tally.least, tally.doubt
-    for begin in range(0, waiting, LANES):
-        count = min(waiting - begin, LANES)
-        for i in range(count):
-            batch[i] = tasks[begin + i]
-            lanes[FIRST_RULE * LANES + i], lanes[ALLOWED * LANES + i] = firsts[begin + i], allowed
+    begin = 0
+    while begin < waiting:
+        count = 0
+        while count < LANES and begin < waiting:
+            batch[count] = tasks[begin]
+            lanes[FIRST_RULE * LANES + count], lanes[ALLOWED * LANES + count] = firsts[begin], allowed
+            # what is behind the plate is left out here, again without branches
+            count += plate.both | (_highest(triangles, batch[count], plate) >= -plate.rounding)
+            begin += 1
         judge_triangles(triangles, batch, count, plate, lanes)
         for i in range(count):
             verdict, error = lanes[VERDICT * LANES + i], lanes[(FOUND + ERROR) * LANES + i]
@@ -205,6 +199,17 @@ def _settle_triangles(
 
 
 @inlined_kernel
+def _highest(triangles: Floats, k: int, plate: PlacedPlate) -> float:
+    """Return the largest z of a triangle's corners in the plate's frame [m]."""
+    T = plate.T_plate_body
+    return max(
+        place(T, triangles[k, 0], triangles[k, 1], triangles[k, 2])[2],
+        place(T, triangles[k, 3], triangles[k, 4], triangles[k, 5])[2],
+        place(T, triangles[k, 6], triangles[k, 7], triangles[k, 8])[2],
+    )
+
+
+@leaf_kernel
 def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally) -> tuple[int, int, float, SumTally]:
     """Open the worst parts, at least as much error as there is too much.
 
@@ -226,27 +231,44 @@ def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally)
         opened += error
         limit = min(limit, error)
         if rule == CLUSTER:
-            size, waiting = _put_parts(clusters, room, part, size, waiting)
+            size, waiting = _put_parts(clusters, room, room.stack, part, False, size, waiting)
         else:
-            tasks[waiting], firsts[waiting] = part, rule + 1
+            tasks[waiting], firsts[waiting] = part, (rule - ABOVE if rule >= ABOVE else rule) + 1
             waiting += 1
     return size, waiting, limit, SumTally(tally.done, tally.spent, least, doubt)
 
 
 @inlined_kernel
-def _put_parts(clusters: Clusters, room: Room, node: int, size: int, waiting: int) -> tuple[int, int]:
-    """Put a node's children on the stack, or a leaf's triangles on the list of tasks; return the new sizes."""
-    links, outlines, triangles = clusters.links, clusters.outlines, clusters.triangles
-    stack, tasks, firsts = room.stack, room.tasks, room.firsts
-    second = links[node, SECOND_CHILD]
+def _put_parts(
+    clusters: Clusters, room: Room, stack: Integers, node: int, grandchildren: bool, size: int, waiting: int
+) -> tuple[int, int]:
+    """Put a node's children on a stack, or these' children, or a leaf's triangles on the list of tasks.
+
+    Returns the new sizes.
+    """
+    links, triangles = clusters.links, clusters.triangles
+    tasks, firsts = room.tasks, room.firsts
+    first, second = node + 1, links[node, SECOND_CHILD]
     if second >= 0:
-        stack[size], stack[size + 1] = second, node + 1
-        prefetch(outlines, second, 0)
-        prefetch(links, second, 0)
-        return size + 2, waiting
+        of_second = links[node, SECOND_OF_SECOND]
+        if grandchildren and of_second >= 0 and links[first, SECOND_CHILD] >= 0:
+            size = _put_node(clusters, stack, second + 1, size)
+            size = _put_node(clusters, stack, of_second, size)
+            size = _put_node(clusters, stack, first + 1, size)
+            return _put_node(clusters, stack, links[first, SECOND_CHILD], size), waiting
+        size = _put_node(clusters, stack, second, size)
+        return _put_node(clusters, stack, first, size), waiting
     for k in range(links[node, BEGIN], links[node, END]):
         tasks[waiting], firsts[waiting] = k, POINTS_1
         prefetch(triangles, k, 0)
-        prefetch(triangles, k, 8)
+        prefetch(triangles, k, LINE)
         waiting += 1
     return size, waiting
+
+
+@inlined_kernel
+def _put_node(clusters: Clusters, stack: Integers, node: int, size: int) -> int:
+    stack[size] = node
+    prefetch(clusters.outlines, node, 0)
+    prefetch(clusters.links, node, 0)
+    return size + 1

@@ -5,26 +5,25 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats
 from replay.numerics.double_double import two_sum
 from replay.numerics.gauss import TRIANGLE_7, TRIANGLE_16
 from replay.numerics.jit import inlined_kernel, leaf_kernel
-from replay.numerics.prefetch import prefetch
-from replay.sensing.capacitive.placed_plate import PlacedPlate, Triple, place, sides_of
+from replay.numerics.triples import Triple
+from replay.sensing.capacitive.placed_plate import PlacedPlate, Pose, place, sides_of
 from replay.sensing.capacitive.tree.clusters import Clusters
 from replay.sensing.capacitive.tree.lanes import corner_in_lanes, load, padded
 from replay.sensing.capacitive.tree.parts import Room, slots_used
 from replay.sensing.capacitive.tree.registers import (
+    ABOVE,
     CLUSTER,
     FOUND,
     FOURTH,
-    FROM,
     LANES,
     MOMENT_COLUMNS,
     NUMBER,
     PART,
-    PART_ABOVE,
     PLACE,
     POINTS_1,
     POINTS_3,
@@ -42,8 +41,8 @@ from replay.sensing.capacitive.tree.registers import (
     VALUES,
     WHOLE,
 )
+from replay.sensing.capacitive.tree.triangle_bounds import tip_of
 
-Floats = NDArray[np.float64]
 Form = tuple[float, float, float, float, float, float]
 
 # Legendre's fourth polynomial, 35 t^2 - 30 t + 3 = 35 (t - _T1)(t - _T2) in t = cos^2, lets one product of forms do.
@@ -52,9 +51,6 @@ _T2 = (30.0 - math.sqrt(480.0)) / 70.0
 
 TRIANGLE_3 = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0], [2.0, 2.0, 2.0]]) / 6.0
 """Barycentric coordinates and weights of three points, polynomials of degree 2 exactly."""
-
-_LINE = 8
-"""Numbers in a line of memory."""
 
 
 @leaf_kernel
@@ -71,11 +67,8 @@ def sum_of_parts(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[fl
         kind = np.uint64(queue.labels[slot, RULE])
         lists[kind, np.uint64(filled[kind])] = slot
         filled[kind] += 1
-    for at in range(filled[CLUSTER]):
-        for line in range(0, MOMENT_COLUMNS, _LINE):
-            prefetch(clusters.moments, queue.labels[lists[CLUSTER, at], PART], line)
     total, lost, in_clusters = 0.0, 0.0, 0
-    for rule in (POINTS_1, PART_ABOVE):
+    for rule in (POINTS_1, ABOVE + POINTS_1):
         for at in range(filled[rule]):
             total += queue.values[lists[rule, at], SHIFT]
     for begin in range(0, filled[CLUSTER], LANES):
@@ -84,14 +77,13 @@ def sum_of_parts(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[fl
         total, e = two_sum(total, value)
         lost += e
         in_clusters += triangles
-    for rule in (POINTS_3, POINTS_7, POINTS_16):
-        points = TRIANGLE_3 if rule == POINTS_3 else (TRIANGLE_7 if rule == POINTS_7 else TRIANGLE_16)
+    alone = filled[POINTS_1] + filled[ABOVE + POINTS_1]
+    for rule in (POINTS_3, POINTS_7, POINTS_16, ABOVE + POINTS_3, ABOVE + POINTS_7, ABOVE + POINTS_16):
         for begin in range(0, filled[rule], LANES):
             count = min(filled[rule] - begin, LANES)
-            value = _triangles(clusters.triangles, plate, room, rule, begin, count, points)
-            total, e = two_sum(total, value)
+            total, e = two_sum(total, _triangles(clusters.triangles, plate, room, rule, begin, count))
             lost += e
-    alone = filled[POINTS_1] + filled[PART_ABOVE] + filled[POINTS_3] + filled[POINTS_7] + filled[POINTS_16]
+        alone += filled[rule]
     return total, lost, filled[CLUSTER], in_clusters, alone
 
 
@@ -126,13 +118,14 @@ def _clusters(moments: Floats, plate: PlacedPlate, room: Room, begin: int, count
 
 
 @leaf_kernel
-def _triangles(
-    triangles: Floats, plate: PlacedPlate, room: Room, rule: int, begin: int, count: int, points: Floats
-) -> float:
+def _triangles(triangles: Floats, plate: PlacedPlate, room: Room, rule: int, begin: int, count: int) -> float:
     """Return the sum over some triangles in the list of a rule [m], each in the region of its centroid."""
     _load_parts(triangles, TRIANGLE_COLUMNS, room, rule, begin, count)
     lanes = room.lanes
-    sum_by_points(points, count, plate, FOUND + REGION, FOUND + SHIFT, lanes)
+    if rule < ABOVE:
+        sum_by_points(rule, count, plate, lanes)
+    else:
+        _sum_above(rule - ABOVE, count, plate, lanes)
     total = 0.0
     for i in range(count):
         total += lanes[SUM * LANES + i]
@@ -152,7 +145,7 @@ def _combine(a: float, t: Form, b: float, q: Form) -> Form:
 
 
 @inlined_kernel
-def mean_by_moments(lanes: Floats, i: int, T: Floats, sides: tuple[float, float], components: Triple) -> float:
+def mean_by_moments(lanes: Floats, i: int, T: Pose, sides: tuple[float, float], components: Triple) -> float:
     """Return the mean of 1/dist [1/m] over a node, from its moments up to the fourth, the first columns of lane i.
 
     T is T_plate_body, `sides` those of the centroid's region, and `components` u, v and z [m] of its distance.
@@ -163,11 +156,11 @@ def mean_by_moments(lanes: Floats, i: int, T: Floats, sides: tuple[float, float]
     """
     u, v, z = components
     inverse = 1.0 / math.sqrt(u * u + v * v + z * z)
-    n0 = (T[0, 0] * u + T[1, 0] * v + T[2, 0] * z) * inverse
-    n1 = (T[0, 1] * u + T[1, 1] * v + T[2, 1] * z) * inverse
-    n2 = (T[0, 2] * u + T[1, 2] * v + T[2, 2] * z) * inverse
+    n0 = (T[0][0] * u + T[1][0] * v + T[2][0] * z) * inverse
+    n1 = (T[0][1] * u + T[1][1] * v + T[2][1] * z) * inverse
+    n2 = (T[0][2] * u + T[1][2] * v + T[2][2] * z) * inverse
     drop_x, drop_y = 1.0 - abs(sides[0]), 1.0 - abs(sides[1])
-    x0, x1, x2, y0, y1, y2 = T[0, 0], T[0, 1], T[0, 2], T[1, 0], T[1, 1], T[1, 2]
+    x0, x1, x2, y0, y1, y2 = T[0][0], T[0][1], T[0][2], T[1][0], T[1][1], T[1][2]
     t = (n0 * n0, n1 * n1, n2 * n2, 2.0 * n0 * n1, 2.0 * n0 * n2, 2.0 * n1 * n2)
     q = (
         1.0 - drop_x * x0 * x0 - drop_y * y0 * y0,
@@ -211,39 +204,82 @@ def mean_by_moments(lanes: Floats, i: int, T: Floats, sides: tuple[float, float]
 
 
 @leaf_kernel
-def sum_by_points(
-    points: Floats, count: int, plate: PlacedPlate, region_column: int, shift_column: int, lanes: Floats
-) -> None:
-    """Write the sums over triangles [m], of which rows of `Clusters.triangles` are in the lanes, to the column SUM.
+def sum_by_points(rule: int, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+    """Write the sums over triangles [m] to the column SUM; their rows and what was found of them are in the lanes."""
+    # a loop for each rule, so that its points are known when it is compiled
+    if rule == POINTS_3:
+        _sum_by(TRIANGLE_3, count, plate, lanes)
+    elif rule == POINTS_7:
+        _sum_by(TRIANGLE_7, count, plate, lanes)
+    else:
+        _sum_by(TRIANGLE_16, count, plate, lanes)
 
-    A triangle's points (4, k), barycentric coordinates and weights, are taken in the region that the lanes say, and its
-    shift [m], in the lanes, is added.
-    """
-    T, half_x, half_y, rounding = plate.T_plate_body, plate.half_x, plate.half_y, plate.rounding
+
+@inlined_kernel
+def _sum_by(points: Floats, count: int, plate: PlacedPlate, lanes: Floats) -> None:
     for i in range(padded(count)):
-        sx, sy = sides_of(lanes[region_column * LANES + i])
-        keep_x, keep_y, shift_x, shift_y = abs(sx), abs(sy), sx * half_x, sy * half_y
-        a = corner_in_lanes(T, rounding, lanes, 0, i)
-        b = corner_in_lanes(T, rounding, lanes, 1, i)
-        c = corner_in_lanes(T, rounding, lanes, 2, i)
-        lanes[FROM * LANES + i] = keep_x * a[0] - shift_x
-        lanes[(FROM + 1) * LANES + i] = keep_x * b[0] - shift_x
-        lanes[(FROM + 2) * LANES + i] = keep_x * c[0] - shift_x
-        lanes[(FROM + 3) * LANES + i] = keep_y * a[1] - shift_y
-        lanes[(FROM + 4) * LANES + i] = keep_y * b[1] - shift_y
-        lanes[(FROM + 5) * LANES + i] = keep_y * c[1] - shift_y
-        lanes[(FROM + 6) * LANES + i] = a[2]
-        lanes[(FROM + 7) * LANES + i] = b[2]
-        lanes[(FROM + 8) * LANES + i] = c[2]
-        lanes[SUM * LANES + i] = 0.0
-    for k in range(points.shape[1]):
-        p, q, s, weight = points[0, k], points[1, k], points[2, k], points[3, k]
-        for i in range(padded(count)):
-            x = p * lanes[FROM * LANES + i] + q * lanes[(FROM + 1) * LANES + i] + s * lanes[(FROM + 2) * LANES + i]
-            y = p * lanes[(FROM + 3) * LANES + i] + q * lanes[(FROM + 4) * LANES + i]
-            y += s * lanes[(FROM + 5) * LANES + i]
-            z = p * lanes[(FROM + 6) * LANES + i] + q * lanes[(FROM + 7) * LANES + i]
-            z += s * lanes[(FROM + 8) * LANES + i]
-            lanes[SUM * LANES + i] += weight / math.sqrt(x * x + y * y + z * z)
+        a, b, c = _components(plate, lanes, i)
+        mean = _mean_over_points(points, a, b, c)
+        lanes[SUM * LANES + i] = lanes[SIZE * LANES + i] * mean + lanes[(FOUND + SHIFT) * LANES + i]
+
+
+@leaf_kernel
+def _sum_above(rule: int, count: int, plate: PlacedPlate, lanes: Floats) -> None:
+    """Do what `sum_by_points` does for the parts of triangles above z = 0."""
+    if rule == POINTS_3:
+        _sum_above_by(TRIANGLE_3, count, plate, lanes)
+    elif rule == POINTS_7:
+        _sum_above_by(TRIANGLE_7, count, plate, lanes)
+    else:
+        _sum_above_by(TRIANGLE_16, count, plate, lanes)
+
+
+@inlined_kernel
+def _sum_above_by(points: Floats, count: int, plate: PlacedPlate, lanes: Floats) -> None:
     for i in range(padded(count)):
-        lanes[SUM * LANES + i] = lanes[SIZE * LANES + i] * lanes[SUM * LANES + i] + lanes[shift_column * LANES + i]
+        a, b, c = _components(plate, lanes, i)
+        tip, p, q, s, t = tip_of(a, b, c)
+        p = (tip[0] + s * p[0], tip[1] + s * p[1], tip[2] + s * p[2])
+        q = (tip[0] + t * q[0], tip[1] + t * q[1], tip[2] + t * q[2])
+        small = s * t * _mean_over_points(points, tip, p, q)
+        # the small triangle, or the large one less that
+        rest = _mean_over_points(points, a, b, c) - small
+        mean = small if tip[2] > 0.0 else rest
+        lanes[SUM * LANES + i] = lanes[SIZE * LANES + i] * mean
+
+
+@inlined_kernel
+def _components(plate: PlacedPlate, lanes: Floats, i: int) -> tuple[Triple, Triple, Triple]:
+    """Return u, v and z [m] of the corners of the triangle in lane i, as its region takes the distance."""
+    T, rounding = plate.T_plate_body, plate.rounding
+    sx, sy = sides_of(lanes[(FOUND + REGION) * LANES + i])
+    keep_x, keep_y, shift_x, shift_y = abs(sx), abs(sy), sx * plate.half_x, sy * plate.half_y
+    a = corner_in_lanes(T, rounding, lanes, 0, i)
+    b = corner_in_lanes(T, rounding, lanes, 1, i)
+    c = corner_in_lanes(T, rounding, lanes, 2, i)
+    return (
+        (keep_x * a[0] - shift_x, keep_y * a[1] - shift_y, a[2]),
+        (keep_x * b[0] - shift_x, keep_y * b[1] - shift_y, b[2]),
+        (keep_x * c[0] - shift_x, keep_y * c[1] - shift_y, c[2]),
+    )
+
+
+@inlined_kernel
+def _mean_over_points(points: Floats, a: Triple, b: Triple, c: Triple) -> float:
+    """Return the mean of 1/dist [1/m] over a triangle by points (4, k), barycentric coordinates and weights."""
+    mean = 0.0
+    # a loop of 16 would be too long to be unrolled, and what holds a loop does not become vectors
+    for k in range(min(points.shape[1], 8)):
+        mean += _at_point(points, k, a, b, c)
+    for k in range(8, points.shape[1]):
+        mean += _at_point(points, k, a, b, c)
+    return mean
+
+
+@inlined_kernel
+def _at_point(points: Floats, k: int, a: Triple, b: Triple, c: Triple) -> float:
+    p, q, s, weight = points[0, k], points[1, k], points[2, k], points[3, k]
+    x = p * a[0] + q * b[0] + s * c[0]
+    y = p * a[1] + q * b[1] + s * c[1]
+    z = p * a[2] + q * b[2] + s * c[2]
+    return weight / math.sqrt(x * x + y * y + z * z)  # type: ignore[no-any-return]

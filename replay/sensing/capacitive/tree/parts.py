@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, kernel
 from replay.sensing.capacitive.tree.registers import (
     COLUMNS,
@@ -28,9 +28,6 @@ from replay.sensing.capacitive.tree.registers import (
     VALUES,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _NONE = -1
 _USED, _HIGHEST, _UNUSED = range(3)
 BUCKETS = 256
@@ -45,9 +42,9 @@ class Queue(NamedTuple):
     """Room for the parts of one sum."""
 
     values: Floats  # (capacity, 4) ERROR, SHIFT, LEAST and REGION, see `lanes`
-    labels: Ints  # (capacity, 3) PART, RULE and NEXT
-    heads: Ints  # (256,) first slot of each bucket, or -1
-    state: Ints  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
+    labels: Integers  # (capacity, 3) PART, RULE and NEXT
+    heads: Integers  # (256,) first slot of each bucket, or -1
+    state: Integers  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
 
 
 @kernel
@@ -125,12 +122,15 @@ class Room(NamedTuple):
     """Memory for the sum over n triangles."""
 
     queue: Queue
-    stack: Ints  # (n + LANES,) nodes to judge
-    tasks: Ints  # (n,) triangles to judge
-    firsts: Ints  # (n,) the first rule to try on each
-    hard: Ints  # (n,) triangles without a rule
-    lists: Ints  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
-    batch: Ints  # (LANES,) what the lanes are about
+    stack: Integers  # (n + LANES,) nodes to judge
+    across: Integers  # (n + LANES,) nodes that may be across z = 0
+    tasks: Integers  # (n,) triangles to judge
+    firsts: Integers  # (n,) the first rule to try on each
+    hard: Integers  # (n,) triangles without a rule
+    lists: Integers  # (RULES + 1, >= n) slots of the queue by rule; the last row counts them
+    batch: Integers  # (LANES,) what the lanes are about
+    keepers: Integers  # (LANES,) lanes of nodes that become parts
+    openers: Integers  # (LANES,) nodes to open, or their lanes
     lanes: Floats  # (COLUMNS x LANES,)
 
 
@@ -140,10 +140,13 @@ def new_room(n: int) -> Room:
     return Room(
         new_queue(n),
         np.empty(n + LANES, np.int64),
+        np.empty(n + LANES, np.int64),
         np.empty(n, np.int64),
         np.empty(n, np.int64),
         np.empty(n, np.int64),
         np.empty((RULES + 1, max(n, RULES)), np.int64),
+        np.empty(LANES, np.int64),
+        np.empty(LANES, np.int64),
         np.empty(LANES, np.int64),
         np.zeros(COLUMNS * LANES),
     )

@@ -1,8 +1,9 @@
 """Where each number stands: the columns of all rows and lanes that the tree works with, in one table.
 
-Rows are read by the line of memory and gathered into lanes, where a column must be at a constant place of one array: a
-kernel over records of named fields is not vectorised. So columns have names here instead; a name that says "first of"
-so many is followed by them.
+Rows are read by the line of memory and gathered into lanes, where a column must be at a constant place of one array:
+over records with named fields, or an array for each column, the same loop takes 1.8 times as long, since the compiler
+then has to make sure that they are different memory. So columns have names here instead; one that says "first of" so
+many is followed by them.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ import numpy as np
 LANES = 64
 """Parts that are judged or summed side by side."""
 
+LINE = 8
+"""Numbers in a line of memory."""
+
 # Clusters.nodes; up to MEAN2 Clusters.outlines has the same columns
 CENTROID = 0  # first of 3 [m]
 RADIUS = 3  # largest distance of a corner from the centroid [m]
 AREA = 4  # [m^2]
-ODD5 = 5  # Frobenius norm of the mean of d d d d d, d from the centroid [m^5]; in outlines times the area
-MEAN5 = 6  # mean of |d|^5, an upper bound [m^5]; in outlines times the area
-MEAN6 = 7  # mean of |d|^6 [m^6]; in outlines times the area
+CORNER5 = 5  # bound of order 5 of the expansion diagonally off the plate [m^5]; in outlines times the area
+EDGE5 = 6  # and elsewhere [m^5]; in outlines times the area
+MEAN6 = 7  # mean of |d|^6, d from the centroid [m^6]; in outlines times the area
 MEAN2 = 8  # mean of |d|^2 [m^2]
 NORMAL = 9  # first of 3: axis of a cone around the outward normals
 OPENING = 12  # cosine of that cone's half angle; -1: anything may point anywhere
@@ -35,6 +39,7 @@ OUTLINE_COLUMNS = 16
 SECOND_CHILD = 0  # or -1; the first child is the next node
 BEGIN = 1  # first triangle
 END = 2  # and one beyond the last
+SECOND_OF_SECOND = 3  # second child of the second child, or -1
 
 # Clusters.triangles, and pieces of triangles
 CORNERS = 0  # first of 9 [m]
@@ -64,7 +69,6 @@ NUMBER = 35  # of triangles
 MOMENT_COLUMNS = 40
 
 # lanes: the first 40 columns hold a row of the above, in the columns it has there
-FROM = 16  # first of 9 beside a triangle's row: u, v and z [m] of its corners, as a point rule takes the distance
 FOUND = 40  # first of what is found of a node or triangle; the same four are Queue.values:
 ERROR = 0  # bound of the error [m]
 SHIFT = 1  # what its expansion or rule is corrected by [m]
@@ -87,10 +91,16 @@ LABELS = 3
 DROP, OPEN, KEEP = -1, 0, 1
 """Verdicts: nothing of it counts; it must be opened; it can be summed as a whole."""
 
-POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE, PART_ABOVE, FREE = range(7)
-"""What a part is summed by. A triangle: by points; or by one point, the part of it that is above z = 0."""
+POINTS_1, POINTS_3, POINTS_7, POINTS_16, NO_RULE = range(5)
+"""What a part is summed by. A triangle: by so many points."""
+
+ABOVE = NO_RULE + 1
+"""Added to a rule: only the part of the triangle that is above z = 0."""
 
 CLUSTER = NO_RULE
-"""A node: by its moments. FREE is a slot without a part."""
+"""A node: by its moments."""
+
+FREE = ABOVE + NO_RULE
+"""A slot without a part."""
 
 RULES = FREE + 1

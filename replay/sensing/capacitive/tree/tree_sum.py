@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 from numba import boolean, float64, int64
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.double_double import two_sum
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.sensing.capacitive.contact import SATURATED, contact, may_touch
@@ -23,17 +23,14 @@ from replay.sensing.capacitive.placed_plate import (
     placed_plate,
     write_triangle,
 )
+from replay.sensing.capacitive.tree.budget import SumTally, budget_of
 from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
-from replay.sensing.capacitive.tree.opening import SumTally, budget_of, refine
+from replay.sensing.capacitive.tree.opening import refine, split_at_plane
 from replay.sensing.capacitive.tree.part_sum import sum_of_parts
 from replay.sensing.capacitive.tree.parts import Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
 from replay.sensing.capacitive.tree.triangle_pieces import Pieces, new_pieces
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 COUNTS = 4
 NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
@@ -51,7 +48,7 @@ def sum_tree(
     both: bool,
     facing: bool,
     rtol: float,
-    counts: Ints,
+    counts: Integers,
 ) -> tuple[Floats, Flags, Floats]:
     """Return what `sum_triangles` returns, to a relative tolerance, and the rigorous bound of the error.
 
@@ -83,7 +80,7 @@ def sum_tree(
 
 @kernel
 def _sum_one(
-    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Ints
+    clusters: Clusters, plate: PlacedPlate, rtol: float, room: Room, pieces: Pieces, counts: Integers
 ) -> tuple[float, bool, float]:
     """Return the integral over a body [m], whether it touches the plate, and the bound of the error [m]."""
     triangles = clusters.triangles
@@ -92,12 +89,12 @@ def _sum_one(
         return math.inf, True, 0.0
     empty(room.queue)
     budget, tally, lost = budget_of(clusters.nodes, plate, rtol), SumTally(0.0, 0.0, 0.0, 0.0), 0.0
-    room.stack[0] = 0
-    size, judged, alone, touching = 1, 0, 0, False
+    size, waiting, judged = split_at_plane(clusters, plate, room)
+    alone, touching = 0, False
     while True:
-        count, in_hard, opened, tally = refine(clusters, plate, budget, room, size, tally)
+        count, in_hard, opened, tally = refine(clusters, plate, budget, room, size, waiting, tally)
         judged += opened
-        size = 0
+        size = waiting = 0
         if count == 0:
             break
         alone += count
@@ -128,7 +125,7 @@ def _sum_one(
 
 
 @leaf_kernel
-def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
+def _add_counts(counts: Integers, nodes: int, clusters: int, in_clusters: int, alone: int) -> None:
     counts[NODES] += nodes
     counts[CLUSTERS] += clusters
     counts[IN_CLUSTERS] += in_clusters
@@ -136,7 +133,7 @@ def _add_counts(counts: Ints, nodes: int, clusters: int, in_clusters: int, alone
 
 
 @leaf_kernel
-def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) -> int:
+def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Integers, found: Integers) -> int:
     """Write the triangles that may saturate to `found`; return how many. Only nodes that reach the plate are opened."""
     T, half_x, half_y = plate.T_plate_body, plate.half_x, plate.half_y
     nodes, links, triangles = clusters.nodes, clusters.links, clusters.triangles
@@ -163,7 +160,7 @@ def _suspects(clusters: Clusters, plate: PlacedPlate, stack: Ints, found: Ints) 
 
 
 @kernel
-def _any_saturates(triangles: Floats, which: Ints, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
+def _any_saturates(triangles: Floats, which: Integers, count: int, plate: PlacedPlate, triangle: Floats) -> bool:
     """Return whether one of the rows which[:count] of `triangles` makes the integral infinite.
 
     `triangle` (3, 3) is scratch memory.

@@ -9,15 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
+from replay.numerics.triples import Triple
 from replay.sensing.capacitive.exact import SCRATCH
-from replay.sensing.capacitive.placed_plate import Triple
 from replay.sensing.capacitive.tree.registers import CORNERS, LANES, OWNER, PIECE_COLUMNS, SIZE
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_PIECES = 48
 """Pieces that may be made of a triangle before the closed form is called for, which then is cheaper."""
@@ -30,15 +27,14 @@ class Pieces(NamedTuple):
 
     pool: Floats  # (_POOL, PIECE_COLUMNS) pieces to judge
     done: Floats  # (3, 2 LANES, PIECE_COLUMNS) pieces that are to be summed by 3, 7 and 16 points
-    in_done: Ints  # (3,)
-    rows: Ints  # (LANES,)
+    in_done: Integers  # (3,)
+    rows: Integers  # (LANES,)
     totals: Floats  # (LANES,) sum of an owner's pieces [m]
     errors: Floats  # (LANES,) and their error bound [m]
     densities: Floats  # (LANES,) error that is allowed, over the area [1/m]
-    made: Ints  # (LANES,) pieces made so far; above MOST_PIECES: given up
-    triangles: Ints  # (LANES,) which triangles the owners are
-    slow: Ints  # (LANES,) triangles that need the closed form
-    identity: Floats  # (4, 4) pieces are in the plate's frame
+    made: Integers  # (LANES,) pieces made so far; above MOST_PIECES: given up
+    triangles: Integers  # (LANES,) which triangles the owners are
+    slow: Integers  # (LANES,) triangles that need the closed form
     triangle: Floats  # (3, 3) a triangle for the closed form
     scratch: Floats  # SCRATCH, of the closed form
 
@@ -57,7 +53,6 @@ def new_pieces() -> Pieces:
         np.empty(LANES, np.int64),
         np.empty(LANES, np.int64),
         np.empty(LANES, np.int64),
-        np.eye(4),
         np.empty((3, 3)),
         np.empty(SCRATCH),
     )

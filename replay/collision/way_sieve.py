@@ -1,0 +1,147 @@
+"""The broad phase of a block whose motion is known: a pair is not looked at before it can have come near.
+
+What is found is what `broad.sieve` leads to, bit for bit. Let the volumes of a pair be g apart in a frame, and the
+boxes at the roots of their trees r. In a later frame, after the bodies have moved by w as seen from each other (`ways`)
+the volumes are at least g - w apart. Of the root boxes no corner has moved farther than k w, k the ratio of the radii
+of spheres that hold the boxes and the bodies, so along the three axes on which their gap is measured they have come
+nearer by k w each: r - sqrt(3) k w is left. While the first is above 0 and the second above the distance of interest,
+the pair is clear and the narrow phase would end at the roots, having found and kept nothing.
+
+Once it has gone on to convex sets it starts the next frame where it ended: from then on to the end of the block every
+frame is looked at, so that what it finds does not depend on what is left out.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import float64, int64
+
+from replay.collision.bodies import BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
+from replay.collision.broad import BY_REPEAT, BY_SPHERE, BY_VOLUME, BY_WAY, same_pose, sphere_gap, volumes_meet
+from replay.collision.gjk_kernel import ROUNDING
+from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, SKIP, PairFrames
+from replay.collision.traversal import box_gap
+from replay.collision.volume_gap import boxes_gap
+from replay.numerics.arrays import Floats, Integers
+from replay.numerics.jit import entry, leaf_kernel
+
+_SLACK = 2.0**-43
+"""Of the lengths that enter a gap: above the rounding of two of them."""
+
+
+@entry(
+    BODIES_TYPE,
+    VOLUMES_TYPE,
+    PAIR_FRAMES_TYPE,
+    int64,
+    int64[:, ::1],
+    float64[:, ::1],
+    float64[::1],
+    float64,
+    int64[::1],
+    float64[:, ::1],
+    float64[:, ::1],
+    float64[::1],
+)
+@leaf_kernel
+def sieve_by_way(
+    bodies: Bodies,
+    volumes: Volumes,
+    frames: PairFrames,
+    begin: int,
+    rows: Integers,
+    ways: Floats,
+    rounding: Floats,
+    limit: float,
+    counts: Integers,
+    scratch: Floats,
+    rotation: Floats,
+    translation: Floats,
+) -> None:
+    """Fill level and task of pairs in frames as `broad.sieve` does.
+
+    Args:
+        bodies, volumes: of the scene; no boxes along the world's axes, whose way is another.
+        frames: level and task are written.
+        begin: 0, or 1 if the block has no frame before it.
+        rows, ways, rounding: of the pairs, as of `interval_proof.certify`.
+        limit: pairs farther apart than this are of no interest [m].
+        counts: (COUNTS,) of `broad`, added to.
+        scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
+    """
+    pairs, poses, level, task = frames.pairs, frames.poses, frames.level, frames.task
+    for p in range(len(pairs)):
+        a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
+        way_a, way_b = rows[p, 0], rows[p, 1]
+        error = 2.0 * (rounding[way_a] + rounding[way_b])
+        ratio = root_ratio(bodies, volumes, a, b)
+        left, quiet = 0.0, True
+        for f in range(level.shape[0]):
+            if f > 0:
+                left -= ways[way_a, f - begin] + ways[way_b, f - begin]
+            if left > 0.0:
+                counts[BY_WAY] += 1
+                level[f, p], task[f, p] = 0, SKIP
+                continue
+            pose = poses[q, f]
+            if f > 0 and same_pose(pose, poses[q, f - 1]):
+                counts[BY_REPEAT] += 1
+                level[f, p], task[f, p] = level[f - 1, p], REPEAT
+                continue
+            level[f, p], task[f, p] = 0, SKIP
+            size = bodies.reach[a] + bodies.reach[b]
+            size += math.sqrt(pose[0, 3] ** 2 + pose[1, 3] ** 2 + pose[2, 3] ** 2)
+            margin = error + _SLACK * (size + volumes.radius[a] + volumes.radius[b])
+            gap = sphere_gap(volumes, a, b, pose)
+            if gap > limit:
+                counts[BY_SPHERE] += 1
+                if quiet and limit > 0.0:
+                    left = (
+                        min(gap, (root_gap(bodies, a, b, pose, size, rotation, translation) - limit) / ratio) - margin
+                    )
+                elif quiet:
+                    left = gap - margin
+            elif volumes_meet(volumes, a, b, pose, frames.turns[0, f], scratch):
+                level[f, p], task[f, p], quiet = 1, RUN, False
+            elif limit > 0.0:
+                root = root_gap(bodies, a, b, pose, size, rotation, translation)
+                if quiet and root > limit:
+                    counts[BY_VOLUME] += 1
+                    left = (
+                        min(boxes_gap(volumes, a, b, pose, frames.turns[0, f], scratch), (root - limit) / ratio)
+                        - margin
+                    )
+                else:
+                    task[f, p], quiet = RUN, False
+            else:
+                counts[BY_VOLUME] += 1
+                left = boxes_gap(volumes, a, b, pose, frames.turns[0, f], scratch) - margin
+
+
+@leaf_kernel
+def root_ratio(bodies: Bodies, volumes: Volumes, a: int, b: int) -> float:
+    """Return by how much a way that bodies take may shorten the gap of the boxes at their roots: sqrt(3) k."""
+    return math.sqrt(3.0) * max(1.0, _ratio(bodies, volumes, a), _ratio(bodies, volumes, b))
+
+
+@leaf_kernel
+def _ratio(bodies: Bodies, volumes: Volumes, body: int) -> float:
+    """Return how much larger a sphere about the body's centre is that holds the box at the root of its tree."""
+    row, square, away = bodies.node_first[body], 0.0, 0.0
+    for i in range(3):
+        square += bodies.node_half[row, i] ** 2
+        away += (bodies.node_center[row, i] - volumes.center[body, i]) ** 2
+    radius: float = volumes.radius[body]
+    return (math.sqrt(square) + math.sqrt(away)) * (1.0 + 2.0**-40) / radius if radius > 0.0 else math.inf
+
+
+@leaf_kernel
+def root_gap(bodies: Bodies, a: int, b: int, pose: Floats, size: float, rotation: Floats, translation: Floats) -> float:
+    """Return what `traversal.closest` computes of the boxes at the roots [m]."""
+    for i in range(3):
+        translation[i] = pose[i, 3]
+        for j in range(3):
+            rotation[i, j] = pose[i, j]
+    row_a, row_b = bodies.node_first[a], bodies.node_first[b]
+    return float(box_gap(bodies, row_a, row_b, rotation, translation, 2.0 * ROUNDING * size))

@@ -1,0 +1,113 @@
+"""COLLADA meshes: unit, axis that points up, nodes within nodes, and files that cannot be used."""
+
+import numpy as np
+import pytest
+
+from replay.errors import RobotError
+from replay.geometry.mesh_file import read_faces
+from replay.robots import dae_file
+from replay.robots.importing import Options, run
+from tests.robots import made
+
+SINGLE = 2.0**-23
+"""Rounding of the matrices of nodes, which pycollada keeps in single precision."""
+
+ASSET = '<asset><unit name="x" meter="{unit}"/><up_axis>{up}</up_axis></asset>'
+GEOMETRY = """<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1000 0 0 0 2000 0 0 0 3000</float_array>
+<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+{faces}</mesh></geometry></library_geometries>"""
+TRIANGLES = """<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>"""
+POLYGONS = """<polylist count="4"><input semantic="VERTEX" source="#v" offset="0"/><vcount>3 3 3 3</vcount>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></polylist>"""
+PLACED = '<instance_geometry url="#g"/>'
+
+
+def dae(unit=1, up="Z_UP", faces=TRIANGLES, node=PLACED, more=""):
+    scene = f'<library_visual_scenes><visual_scene id="s"><node>{node}</node></visual_scene></library_visual_scenes>'
+    head = '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+    body = ASSET.format(unit=unit, up=up) + GEOMETRY.format(faces=faces) + more + scene
+    return f'{head}{body}<scene><instance_visual_scene url="#s"/></scene></COLLADA>'.encode()
+
+
+def read(tmp_path, **kinds):
+    return dae_file.read(tmp_path / "x.dae", dae(**kinds))
+
+
+@pytest.mark.parametrize("faces", [TRIANGLES, POLYGONS])
+@pytest.mark.parametrize(("up", "far"), [("Z_UP", (1, 2, 3)), ("Y_UP", (1, -3, 2)), ("X_UP", (-2, -3, 1))])
+def test_unit_and_the_axis_that_points_up_are_applied(up, far, faces, tmp_path):
+    found = read(tmp_path, unit=0.001, up=up, faces=faces)
+    assert (found.unit, found.up, found.triangles.shape) == (0.001, up, (4, 3, 3))
+    ends = np.array([found.triangles.min(axis=(0, 1)), found.triangles.max(axis=(0, 1))])
+    np.testing.assert_allclose(ends, np.sort([np.zeros(3), far], axis=0), rtol=1e-15, atol=1e-15)
+    a, b, c = np.moveaxis(found.triangles, 1, 0)
+    assert np.sum(a * np.cross(b, c)) / 6 == pytest.approx(1.0, rel=1e-12)  # still seen from outside
+
+
+def test_nodes_place_what_they_hold(tmp_path):
+    inner = f"<node><scale>2 1 1</scale>{PLACED}</node>"
+    node = f"<translate>10 0 0</translate><rotate>0 0 1 90</rotate>{inner}<node><scale>-1 1 1</scale>{PLACED}</node>"
+    found = read(tmp_path, node=node)
+    first, second = found.triangles[:4], found.triangles[4:]
+    np.testing.assert_allclose(first.max(axis=(0, 1)), [10, 2000, 3000], atol=SINGLE * 3000)
+    np.testing.assert_allclose(first.min(axis=(0, 1)), [10 - 2000, 0, 0], atol=SINGLE * 3000)
+    a, b, c = np.moveaxis(second, 1, 0)
+    assert np.sum((a - second[0, 0]) * np.cross(b - second[0, 0], c - second[0, 0])) > 0  # mirrored, and turned over
+
+
+@pytest.mark.parametrize(
+    ("data", "rule"),
+    [
+        (b"<?xml version='1.0'?><!DOCTYPE COLLADA [<!ENTITY a 'b'>]><COLLADA/>", "has a DOCTYPE"),
+        (b"<COLLADA/>", "has no scene"),
+        (dae()[:-40], "is not XML"),
+        (dae(faces=TRIANGLES.replace("1 2 3</p>", "1 2 9</p>")), "maxindex=9"),
+        (dae(faces=""), "holds no triangles"),
+        (dae(unit=0), "has a unit of 0 m"),
+        (dae(node="<node>" * 45 + PLACED + "</node>" * 45), None),
+        (dae(node="<node>" * 200 + PLACED + "</node>" * 200), "elements more than 100 deep"),
+        (
+            dae(
+                node='<instance_node url="#n"/>',
+                more='<library_nodes><node id="n"><instance_node url="#n"/></node></library_nodes>',
+            ),
+            "",
+        ),
+        (dae(node=PLACED * 21_000), "has a scene of more than"),
+    ],
+)
+def test_files_that_cannot_be_used_are_refused(data, rule, tmp_path):
+    if rule is None:
+        assert len(dae_file.read(tmp_path / "x.dae", data).triangles) == 4
+        return
+    with pytest.raises(RobotError, match=r"x\.dae") as caught:
+        dae_file.read(tmp_path / "x.dae", data)
+    assert rule in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_an_import_writes_them_as_stl_beside_the_part(tmp_path):
+    (tmp_path / "x.dae").write_bytes(dae(unit=0.001))
+    (tmp_path / "r.urdf").write_text(made.robot(made.link("a", '<mesh filename="x.dae" scale="2 2 2"/>')))
+    done = run(tmp_path / "r.urdf", tmp_path / "part.yaml", Options())
+    assert done.meshes == (tmp_path / "part" / "x.stl",) and not done.lossy
+    vertices, faces = read_faces(tmp_path / "part" / "x.stl")
+    assert len(faces) == 4 and vertices.max(axis=0).tolist() == [1, 2, 3]
+    assert "file: part/x.stl, scale: 2}" in done.file.read_text()
+    assert "mesh x.dae: is written as STL, from units of 0.001 m to metres" in map(str, done.changes)
+
+
+def test_the_axis_that_points_up_can_be_left_as_it_is(tmp_path):
+    (tmp_path / "x.dae").write_bytes(dae(up="Y_UP"))
+    (tmp_path / "r.urdf").write_text(made.robot(made.link("a", '<mesh filename="x.dae"/>')))
+    for up_axis, most, rule in (
+        ("apply", [1000, 0, 2000], "turned from"),
+        ("ignore", [1000, 2000, 3000], "not turned"),
+    ):
+        done = run(tmp_path / "r.urdf", tmp_path / "part.yaml", Options(up_axis=up_axis))
+        vertices, _ = read_faces(tmp_path / "part" / "x.stl")
+        assert vertices.max(axis=0).tolist() == most
+        assert rule in str(done.changes[0]) and "RViz" in str(done.changes[0])

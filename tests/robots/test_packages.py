@@ -1,0 +1,86 @@
+"""Where the files of a description are looked for, and what the part calls them."""
+
+import pytest
+
+from replay.errors import RobotError
+from replay.robots.importing import Options, run
+from replay.robots.packages import Packages
+from replay.robots.xml_text import XmlElement
+from tests.robots import made
+from tests.robots.test_part import STL
+
+AT = XmlElement("mesh", {}, "r.urdf", 7)
+
+
+def put(path):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(STL)
+    return path
+
+
+def found(folder, written, given=(), **environment):
+    packages = Packages(folder / "r.urdf", dict(given), {name: str(path) for name, path in environment.items()})
+    return packages.find(written, AT)
+
+
+@pytest.mark.parametrize(
+    ("description", "mesh"),
+    [
+        ("robot/urdf", "robot/meshes/a.stl"),  # the package is the folder of that name above
+        ("other/urdf", "robot/meshes/a.stl"),  # it is beside
+        ("install/bringup/share/bringup", "install/robot/share/robot/meshes/a.stl"),  # an install tree of ROS 2
+        ("share/bringup/urdf", "share/robot/meshes/a.stl"),  # or one that was merged
+        ("ws/src/bringup", "ws/src/robot/meshes/a.stl"),
+    ],
+)
+def test_packages_are_found_in_the_descriptions_own_tree(description, mesh, tmp_path):
+    path = put(tmp_path / mesh)
+    (tmp_path / description).mkdir(parents=True, exist_ok=True)
+    here = found(tmp_path / description, "package://robot/meshes/a.stl")
+    assert here.path == path and not here.assumed
+
+
+def test_packages_are_found_by_their_manifest_and_where_ros_says(tmp_path):
+    path = put(tmp_path / "x" / "folder" / "meshes" / "a.stl")
+    (tmp_path / "x" / "folder" / "package.xml").write_text("<package><name>robot</name></package>")
+    (tmp_path / "y" / "urdf").mkdir(parents=True)
+    written = "package://robot/meshes/a.stl"
+    assert found(tmp_path / "x" / "folder" / "urdf", written).path == path
+    assert found(tmp_path / "y" / "urdf", written, ROS_PACKAGE_PATH=tmp_path / "x").path == path
+    installed = put(tmp_path / "opt" / "share" / "robot" / "meshes" / "a.stl")
+    assert found(tmp_path / "y" / "urdf", written, AMENT_PREFIX_PATH=tmp_path / "opt").path == installed
+    assert (
+        found(tmp_path / "y" / "urdf", written, {"robot": tmp_path / "x" / "folder"}).path == path
+    )  # given ones first
+
+
+def test_a_tree_that_lost_the_name_of_its_package_is_told(tmp_path):
+    path = put(tmp_path / "moved" / "meshes" / "a.stl")
+    here = found(tmp_path / "moved" / "urdf", "package://robot/meshes/a.stl")
+    assert here.path == path and here.assumed == f"package robot is taken to be {tmp_path / 'moved'}"
+
+
+def test_what_is_not_found_says_where_it_was_looked_for(tmp_path):
+    (tmp_path / "robot").mkdir()
+    with pytest.raises(RobotError) as caught:
+        found(tmp_path / "robot" / "urdf", "package://robot/a.stl")
+    looked = f"looked for {tmp_path}/robot/a.stl; give its folder with --package robot=DIR"
+    assert str(caught.value) == f"r.urdf:7: 'package://robot/a.stl' is not to be found: {looked}"
+    (tmp_path / "r.urdf").write_text(made.robot(made.link("a")))
+    for wrong in ("robot", "robot=", "=x", f"robot={tmp_path}/nowhere"):
+        with pytest.raises(RobotError, match="--package"):
+            run(tmp_path / "r.urdf", tmp_path / "p.yaml", Options(packages=[wrong]))
+
+
+def test_meshes_are_named_in_place_or_copied(tmp_path):
+    put(tmp_path / "robot" / "meshes" / "a.stl")
+    mesh = '<mesh filename="package://robot/meshes/a.stl"/>'
+    (tmp_path / "robot" / "r.urdf").write_text(made.robot(made.link("a", mesh)))
+    parts = tmp_path / "parts"
+    done = run(tmp_path / "robot" / "r.urdf", parts / "p.yaml", Options())
+    assert "file: ../robot/meshes/a.stl" in done.file.read_text().replace('"', "") and not done.meshes
+    assert f"must stand in {tmp_path}, or above" in str(done.changes[0])
+    done = run(tmp_path / "robot" / "r.urdf", parts / "p.yaml", Options(copy_meshes=True))
+    assert "file: p/a.stl" in done.file.read_text() and (parts / "p" / "a.stl").read_bytes() == STL
+    done = run(tmp_path / "robot" / "r.urdf", tmp_path / "p.yaml", Options())
+    assert "file: robot/meshes/a.stl" in done.file.read_text() and not done.changes
