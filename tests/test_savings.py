@@ -40,7 +40,7 @@ def both(scenario, model=None):
         columns = {}
         for group in ("collision", "distance", "capacitive"):
             if getattr(blocks[0], group) is not None:
-                names = [field.name for field in getattr(blocks[0], group).fields()]
+                names = [field.name for field in getattr(blocks[0], group).present()]
                 for name in names:
                     columns[f"{group}.{name}"] = np.concatenate([getattr(getattr(b, group), name) for b in blocks])
             if group == "collision":

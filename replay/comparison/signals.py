@@ -162,7 +162,8 @@ def places(layout: Layout, topic: str, format: int) -> tuple[object, int]:
             return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
         case "collision":
             return layout.pairs, len(_of_format(CollisionColumns, format)) * len(layout.pairs)
-    fields = _of_format(KINDS[group].columns, format) if group in KINDS else []
+    known = _of_format(KINDS[group].columns, format) if group in KINDS else []
+    fields = [field_ for field_ in known if not field_.optional]
     meant = {names: getattr(layout, names) for field_ in fields for names in (field_.each, field_.names) if names}
     counts = (len(meant[field_.each]) if field_.each else len(field_.letters) or 1 for field_ in fields)
     return meant, sum(counts)

@@ -159,6 +159,7 @@ class Quantity:
         above, at_least, below, at_most: limits in SI; a value is > above, >= at_least, < below and <= at_most.
         infinite: whether `.inf` is meaningful here.
         exact: keep the value as a `Fraction`.
+        words: texts that stand for a value, and the value.
     """
 
     name: str
@@ -169,6 +170,7 @@ class Quantity:
     at_most: float | None = None
     infinite: bool = False
     exact: bool = False
+    words: tuple[tuple[str, float], ...] = ()
 
     def parse(self, value: object) -> float | Fraction:
         """Return the value in SI.
@@ -176,6 +178,12 @@ class Quantity:
         Raises:
             PydanticCustomError: it is something else, has a wrong unit, or is outside the limits.
         """
+        for word, meant in self.words:
+            if value == word:
+                return meant
+        if self.words and isinstance(value, str) and value.strip().isalpha():
+            choices = ", ".join(word for word, _ in self.words)
+            raise _rejected(f"is none of {choices}, and not {self.dimension.name}; {self.dimension.what_works}")
         exact, _ = _exact(value, (self.dimension,))
         number = _double(exact)
         if math.isinf(number) and not self.infinite:
@@ -204,7 +212,10 @@ class Quantity:
             "maximum": self.at_most,
         }
         number: dict[str, Any] = {"type": "number"} | {key: limit for key, limit in limits.items() if limit is not None}
-        return json_schema(self.name, number, (self.dimension,))
+        result = json_schema(self.name, number, (self.dimension,))
+        if self.words:
+            result["anyOf"].insert(0, {"enum": [word for word, _ in self.words]})
+        return result
 
 
 @dataclass(frozen=True)
@@ -284,6 +295,10 @@ MaxAngularAcceleration = Annotated[
 ]
 Capacitance = Annotated[float, Quantity("Capacitance", CAPACITANCE, at_least=1e-18, at_most=1.0)]
 StrayCapacitance = Annotated[float, Quantity("StrayCapacitance", CAPACITANCE, at_least=0.0, at_most=1.0)]
+Earth = Annotated[
+    float,
+    Quantity("Earth", CAPACITANCE, at_least=0.0, at_most=1.0, words=(("grounded", math.inf), ("floating", 0.0))),
+]
 Permittivity = Annotated[float, Quantity("Permittivity", PERMITTIVITY, at_least=1e-18, at_most=1.0)]
 Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1e6)]
 Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]

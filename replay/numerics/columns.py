@@ -58,6 +58,7 @@ class Field:
         most: largest value of one that counts or is a state; what its type or `states` allow when left out.
         nothing: the value when there is nothing to tell; of `Columns` it follows from the type unless it is a state.
         since: version of the recording format that first holds it; the column of an older recording is None.
+        optional: whether the column may be None; it follows from its type. A sensor's that is None is not recorded.
     """
 
     name: str = ""
@@ -78,6 +79,7 @@ class Field:
     most: int = 0
     nothing: float = np.nan
     since: int = 1
+    optional: bool = False
 
 
 class Columns:
@@ -100,6 +102,8 @@ class Columns:
         """Return columns that tell nothing; `counts` says how many names there are of what a field has `each` of."""
         values = {}
         for field in cls.fields():
+            if field.optional:
+                continue
             rest = (counts[field.each],) if field.each else (len(field.letters),) if field.letters else ()
             values[field.name] = np.full((frames, sensors, *rest), field.nothing, dtype=field.type)
         return cls(**values)
@@ -107,6 +111,7 @@ class Columns:
 
 def _described(name: str, array: Any, field: Field) -> Field:
     """Return the description of a column, with what follows from its name and type."""
+    optional = type(None) in get_args(array)
     array = next(part for part in (*get_args(array), array) if get_origin(part) is np.ndarray)  # X of "X | None"
     dtype = np.dtype(get_args(get_args(array)[1])[0])
     kinds = {"f": Kind.NUMBER, "b": Kind.FLAG}
@@ -124,6 +129,7 @@ def _described(name: str, array: Any, field: Field) -> Field:
         most=most,
         type=dtype,
         nothing=nothing if np.isnan(field.nothing) else field.nothing,
+        optional=optional,
     )
 
 

@@ -253,6 +253,6 @@ def _subjects(layout: Layout) -> Iterator[tuple[str, str, str]]:
 
 def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:
     for columns in (block.collision, *(block.readings.get(kind) for kind in KINDS)):
-        for field in () if columns is None else columns.fields():
+        for field in () if columns is None else columns.present():
             for state, event in enumerate(field.events, start=1):
                 yield event, getattr(columns, field.name) >= state

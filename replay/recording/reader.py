@@ -293,6 +293,8 @@ class _Assembly:
         return found
 
     def _of_sensors(self, topics: list[Topic], field: Field) -> NDArray[Any] | None:
+        if field.optional and not any(field.name in topic.columns for topic in topics):
+            return None  # its method has no such column
         values = [self._field(topic, field) for topic in topics]
         present = [value for value in values if value is not None]
         return np.stack(present, axis=1) if present else None

@@ -68,7 +68,7 @@ class FrameTopic:
             yield rows
 
 
-def frame_topics(layout: Layout, *, collision: bool, kinds: Collection[str]) -> Iterator[FrameTopic]:
+def frame_topics(layout: Layout, *, collision: bool, kinds: Mapping[str, Collection[Field]]) -> Iterator[FrameTopic]:
     """Yield the topics of a recording that have a message in every frame, `/joint_states` last.
 
     The last one marks a block as complete for those who salvage a cut file.
@@ -76,7 +76,7 @@ def frame_topics(layout: Layout, *, collision: bool, kinds: Collection[str]) -> 
     Args:
         layout: the names behind the columns.
         collision: whether there are results of pairs.
-        kinds: of sensors of which there are readings.
+        kinds: of sensors of which there are readings, and the fields of these.
     """
     yield _topic("/tf", messages.TRANSFORMS, _transforms_example(layout), _transforms(layout))
     if collision:
@@ -84,7 +84,7 @@ def frame_topics(layout: Layout, *, collision: bool, kinds: Collection[str]) -> 
         yield _topic("/collision", messages.COLLISION, example, _collision)
     for kind in KINDS.values():
         if kind.name in kinds:
-            example = _example(kind.columns.fields(), layout)
+            example = _example(kinds[kind.name], layout)
             for index, name in enumerate(layout.sensors[kind.name]):
                 yield _topic(kind.topic(name), kind.message, example, _reading(kind.name, index))
     yield _topic("/joint_states", messages.JOINTS, _joints_example(layout), _joints)
@@ -188,12 +188,10 @@ def _values(block: FrameBlock, columns: Any, field: Field) -> Column:
 
 
 def _reading(kind: str, sensor: int) -> Callable[[FrameBlock], Columns]:
-    fields = KINDS[kind].columns.fields()
-
     def columns(block: FrameBlock) -> Columns:
         found: Columns = {}
-        for field in fields:
-            found |= components(field, _values(block, block.readings[kind], field)[:, sensor])
+        for field in block.readings[kind].present():
+            found |= components(field, getattr(block.readings[kind], field.name)[:, sensor])
         return found
 
     return columns

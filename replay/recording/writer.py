@@ -17,6 +17,7 @@ from replay.recording.provenance import RECORD, Provenance
 from replay.recording.scene_update import scene_message
 from replay.recording.scene_view import SceneView
 from replay.recording.topics import FrameTopic, frame_topics
+from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock
 
 _MEDIA_TYPES = {
@@ -78,7 +79,11 @@ class McapWriter:
             self._log.attachment(name, _MEDIA_TYPES.get(ending, "application/octet-stream"), data)
         self._scene_data = scene_message(self._scene)
         layout = self._provenance.layout
-        kinds = [kind for kind, names in layout.sensors.items() if names]
+        kinds = {
+            kind: [field for field in KINDS[kind].columns.fields() if not field.optional]
+            for kind, names in layout.sensors.items()
+            if names
+        }
         list(frame_topics(layout, collision=bool(layout.pairs), kinds=kinds))  # shapes are found here
 
     def write(self, block: FrameBlock) -> None:
@@ -120,7 +125,8 @@ class McapWriter:
 
     def _begin(self, log: McapFileWriter, block: FrameBlock) -> None:
         collision = block.collision is not None
-        topics = list(frame_topics(self._provenance.layout, collision=collision, kinds=block.readings))
+        kinds = {kind: columns.present() for kind, columns in block.readings.items()}
+        topics = list(frame_topics(self._provenance.layout, collision=collision, kinds=kinds))
         types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG})
         schemas = {name: log.schema(messages.schema(name)) for name in types}
         scene = log.channel("/scene", schemas[messages.SCENE])

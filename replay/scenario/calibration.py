@@ -23,6 +23,7 @@ from replay.scenario.model import Scenario
 from replay.scenario.scene import build
 from replay.sensing.calibration import CONFIDENCE, QUANTITIES, Calibration, Quantity, calibrate
 from replay.sensing.capacitive.kind import Capacitive
+from replay.sensing.capacitive.part import ELECTROSTATIC
 
 _DIGITS = 10
 """Of fitted numbers in a sensor file; the model itself is good to 6."""
@@ -58,19 +59,28 @@ class SensorPath:
         ]
         self._linkage = scene.linkage
         self._start = sample(scene.linkage, scene.script, np.zeros(1))
-        unit = replace(self.sensor, permittivity=1.0, stray_capacitance=0.0)
+        method = scene.model.capacitive
+        same_link = [found for found in sensors.values() if found.link == self.sensor.link]
+        # to electrostatics, the plates of the sensors beside it belong to what it reads
+        own = same_link if method.method in ELECTROSTATIC else [self.sensor]
         self.method = scene.model.identity()["capacitive"]
-        self._suite: Any = Capacitive().suite([unit], scene.targets, scene.model.capacitive, savings=True)
+        self._column = own.index(self.sensor)
+        alone = [replace(found, permittivity=1.0, stray_capacitance=0.0) for found in own]
+        self._suite: Any = Capacitive().suite(alone, scene.targets, method, savings=True)
 
     def integral(self, positions: ArrayLike) -> Floats:
-        """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated."""
+        """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated.
+
+        With electrostatics it is what the sensor reads over the vacuum's permittivity, NaN where that is not resolved.
+        """
         at = np.asarray(positions, dtype=np.float64)
         states = np.repeat(self._start.positions, len(at), axis=0)
         states[:, self._linkage.joint_names.index(self.joint.name)] = at
         states = self._linkage.followed(states)
         poses = self._linkage.forward(states, np.repeat(self._start.free_poses, len(at), axis=0))
-        capacitance: Floats = self._suite.run(poses).capacitance
-        return capacitance[:, 0]
+        columns = self._suite.run(poses)
+        found: Floats = columns.capacitance[:, self._column]
+        return found if columns.unresolved is None else np.where(columns.unresolved[:, self._column], np.nan, found)
 
     def positions(self, curve: Curve) -> Floats:
         """Return a curve's abscissa as joint positions (n,) [rad or m].
@@ -94,7 +104,7 @@ class SensorPath:
         for line, value in zip(curve.lines, found, strict=True):
             if not np.isfinite(value):
                 raise CurveError(
-                    curve.file, line, "the sensor is in contact there and has no finite reading; leave it out"
+                    curve.file, line, "the sensor is in contact there, or too near, and has no reading; leave it out"
                 )
         return found
 

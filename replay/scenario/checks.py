@@ -227,6 +227,11 @@ def _sensors(names: Names) -> Iterator[Finding]:
                 if not names.links_matching(pattern):
                     rule = did_you_mean(pattern, names.parents, what="links are")
                     yield (*path, "ignore", index), f"matches no link; {rule}"
+            own = [shape.name for shape in names.shapes if shape.link == sensor.link]
+            for place, shape in KINDS[kind].own_shapes(sensor).items():
+                if shape not in own:
+                    rule = did_you_mean(shape, own, what="its shapes are") if own else "it has no shapes"
+                    yield (*path, *place), f"is no shape of link {sensor.link!r}; {rule}"
 
 
 def _disabled(names: Names) -> Iterator[Finding]:

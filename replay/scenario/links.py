@@ -13,6 +13,7 @@ from replay.language.units import (
     LENGTH,
     Angle,
     Dimensioned,
+    Earth,
     JointPosition,
     Length,
     MaxAcceleration,
@@ -168,3 +169,6 @@ class LinkPart(Part):
     """How the link moves in the joint's frame."""
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""
+    earth: Earth = math.inf
+    """How the link is connected to earth, for the capacitive method bem: grounded, floating, or through a
+    capacitance [F] of what is not modelled (shoes, a mattress)."""

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
 from replay.scenario.expectations import BetweenPart, PairExpectation
+from replay.scenario.names import matches
+from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
     from replay.collision.pairs import CollisionBody
@@ -46,12 +48,30 @@ def notes(
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, BetweenPart) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    found.extend(_sensor_notes(scenario, model or scenario.model))
     if (model or scenario.model).collision.between == "sampled":
         from replay.scenario.scene import primitive_solids
         from replay.scenario.speed_notes import speed_notes
 
         found.extend(speed_notes(scenario, primitive_solids(scenario) if solids is None else solids))
     return found
+
+
+def _sensor_notes(scenario: Scenario, model: Model) -> Iterator[Problem]:
+    earth = {name: link.earth for name, link in scenario.links.items()}
+    sensed = [name for name, link in scenario.links.items() if any(shape.sense for shape in link.shapes.values())]
+    for kind in KINDS.values():
+        written = scenario.sensors.of(kind.name)
+        felt = {
+            name: [
+                link
+                for link in sensed
+                if link != sensor.link and not any(matches(pattern, link) for pattern in sensor.ignore)
+            ]
+            for name, sensor in written.items()
+        }
+        for path, rule in kind.notes(written, felt, earth, getattr(model, kind.name)):
+            yield scenario.provenance.problem(("sensors", kind.name, *path), rule)
 
 
 def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:

@@ -141,10 +141,16 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
     machine = linkage(scenario)
     scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
-    sensors = {kind: _sensors(scenario, machine, kind) for kind in KINDS}
+    sensors = {kind: _sensors(scenario, machine, kind, scene_shapes) for kind in KINDS}
     sensed = [shape for shape in scene_shapes if shape.sensed] if any(sensors.values()) else []
     targets = tuple(
-        make_target(shape.name, shape.link, shape.solid.triangles, closing=shape.solid.closing_of_inside)
+        make_target(
+            shape.name,
+            shape.link,
+            shape.solid.triangles,
+            closing=shape.solid.closing_of_inside,
+            earth=scenario.links[machine.link_names[shape.link]].earth,
+        )
         for shape in sensed
     )
     names = tuple(target.name for target in targets)
@@ -272,18 +278,17 @@ def _collision(
         raise ScenarioError([scenario.provenance.problem(("collision", "pairs"), rule)]) from None
 
 
-def _sensors(scenario: Scenario, machine: Linkage, kind: str) -> tuple[Any, ...]:
+def _sensors(scenario: Scenario, machine: Linkage, kind: str, scene_shapes: Sequence[SceneShape]) -> tuple[Any, ...]:
     """Return the sensors of a kind, sorted by name."""
     links = list(enumerate(machine.link_names))
-    return tuple(
-        KINDS[kind].sensor(
-            name,
-            written,
-            machine.link_index(written.link),
-            frozenset(k for k, link in links if any(matches(pattern, link) for pattern in written.ignore)),
-        )
-        for name, written in sorted(scenario.sensors.of(kind).items())
-    )
+    found = []
+    for name, written in sorted(scenario.sensors.of(kind).items()):
+        link = machine.link_index(written.link)
+        ignored = frozenset(k for k, other in links if any(matches(pattern, other) for pattern in written.ignore))
+        shapes = {s.name.partition("/")[2]: s.solid.triangles for s in scene_shapes if s.link == link}
+        sensor = KINDS[kind].sensor(name, written, link, ignored)
+        found.append(KINDS[kind].with_shapes(sensor, written, shapes))
+    return tuple(found)
 
 
 def _each_object(kind: str) -> bool:

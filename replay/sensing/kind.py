@@ -8,7 +8,7 @@ description imports at its top must be light: `replay validate` loads it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -147,6 +147,27 @@ class SensorKind(ABC):
     @abstractmethod
     def sensor(self, name: str, part: Any, link: int, ignored_links: frozenset[int]) -> Any:
         """Return a sensor of how it is written, on a link by its index; it has a `name` and a `link`."""
+
+    def own_shapes(self, part: Any) -> Mapping[tuple[str | int, ...], str]:
+        """Return the shapes of its own link that a sensor as it is written names, by where it does."""
+        return {}
+
+    def with_shapes(self, sensor: Any, part: Any, shapes: Mapping[str, Floats]) -> Any:
+        """Return a sensor that knows the shapes of its own link: triangles (n, 3, 3) [m] by name; most need none."""
+        return sensor
+
+    def notes(
+        self, parts: Mapping[str, Any], felt: Mapping[str, Sequence[str]], earth: Mapping[str, float], method: Any
+    ) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Yield what a reader should know of sensors as they are written, each with its path from the kind's on.
+
+        Args:
+            parts: the sensors by name.
+            felt: the links that each senses.
+            earth: of each link, see `sensing.target.Target`.
+            method: how they are computed.
+        """
+        yield from ()
 
     @abstractmethod
     def drawing(self, sensor: Any) -> Drawing:

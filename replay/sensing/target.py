@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ class Target:
         tree: over the triangles, in the link's frame.
         closing: (m, 3, 3) the caps [m] of a body that has an inside, none if it is closed; None: it has no inside. See
             `geometry.closing`.
+        earth: capacitance [F] between the link and earth through what is not modelled; inf: the link is grounded.
     """
 
     name: str
@@ -30,16 +32,19 @@ class Target:
     triangles: Floats
     tree: Tree
     closing: Floats | None = None
+    earth: float = math.inf
 
 
-def make_target(name: str, link: int, triangles: ArrayLike, *, closing: Floats | None = None) -> Target:
+def make_target(
+    name: str, link: int, triangles: ArrayLike, *, closing: Floats | None = None, earth: float = math.inf
+) -> Target:
     """Return the target of a shape.
 
     Args:
         name: "link/shape".
         link: index of the link that carries the shape, 0 or more.
         triangles: (n, 3, 3) corners in the link's frame [m], finite, n >= 1.
-        closing: see `Target`.
+        closing, earth: see `Target`.
 
     Raises:
         InvalidValue: wrong shape, no triangles, a coordinate that is not finite, a negative link.
@@ -51,4 +56,4 @@ def make_target(name: str, link: int, triangles: ArrayLike, *, closing: Floats |
         raise InvalidValue(f"{name}.triangles", "an array with NaN or infinity", "must be finite")
     if link < 0:
         raise InvalidValue(f"{name}.link", link, "must be the index of a link, 0 or more")
-    return Target(name, link, corners, triangle_tree(corners), closing)
+    return Target(name, link, corners, triangle_tree(corners), closing, earth)

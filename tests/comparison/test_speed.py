@@ -32,6 +32,8 @@ def disturb(columns):
     rng = np.random.default_rng(1)
     for field in dataclasses.fields(columns):
         values = getattr(columns, field.name)
+        if values is None:
+            continue
         if field.name in ("collision", "readings"):
             for group in values.values() if isinstance(values, dict) else (values,):
                 disturb(group)

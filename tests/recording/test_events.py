@@ -21,7 +21,7 @@ from replay.recording.events import SEVERITY, Events, Transition
 from replay.recording.reader import read
 from tests.recording.test_round_trip import write
 
-KINDS = ("bounds", "contact", "undecided", "detection", "too close", "saturation")
+KINDS = ("bounds", "contact", "undecided", "detection", "too close", "saturation", "unresolved")
 # The last ones end in bytes that look like the field of the frame, or like the words of an event.
 NAMES = ("arm/a|table/b", "left ä", "s5five", "5\x05\0\0\0", "5", "x begins: y", "")
 TRANSITIONS = st.builds(Transition, st.sampled_from(KINDS), st.booleans(), st.sampled_from(NAMES), st.text(max_size=3))
@@ -46,6 +46,7 @@ def log_message(time: int, frame: int, what: Transition, earliest: int | None = 
 def test_how_severe_each_beginning_is_and_that_an_end_is_information() -> None:
     """In Foxglove's levels: 2 is information, 3 a warning, 4 an error."""
     severe = {"bounds": 3, "contact": 4, "undecided": 3, "detection": 2, "too close": 3, "saturation": 3}
+    severe |= {"unresolved": 3}
     assert severe == SEVERITY and set(severe) == set(KINDS)
     for kind, level in severe.items():
         assert Transition(kind, True, "x", "/y").severity == level

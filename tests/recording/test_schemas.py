@@ -63,6 +63,9 @@ def test_field_numbers_stay_for_ever() -> None:
             "saturated": 4,
             "touching": 5,
             "per_object": 6,
+            "increase": 7,
+            "error": 8,
+            "unresolved": 9,
         },
     }
 

@@ -22,6 +22,10 @@ class CapacitiveColumns(Columns):
         saturated: (n, C) bool, the integral is infinite, or a plate is in a sensed body, or flush and facing into it.
         touching: (n, C) bool, a sensed shape and a plate have a point in common.
         per_object: (n, C, O) [F], what each sensed shape contributes; 0 for shapes the sensor ignores.
+        increase: (n, C) [F], what bodies add to the capacitance, inf when saturated; None, as all that follows, with
+            methods that are no electrostatics, whose capacitance is that and the stray one.
+        error: (n, C) [F], how far off the increase is estimated to be; NaN when saturated or unresolved.
+        unresolved: (n, C) bool, a body is nearer than the method resolves: read at a larger gap.
     """
 
     capacitance: Annotated[Floats, Field(unit="F", gate="saturated")]
@@ -30,3 +34,6 @@ class CapacitiveColumns(Columns):
     saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
     touching: Annotated[Flags, Field(begins=("touch",))]
     per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]
+    increase: Annotated[Floats | None, Field(unit="F", gate="saturated", since=2)] = None
+    error: Annotated[Floats | None, Field(unit="F", gate="unresolved", since=2)] = None
+    unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3}, since=2)] = None

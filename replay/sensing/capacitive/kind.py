@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from replay.numerics import transforms
+from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.columns import CapacitiveColumns
-from replay.sensing.capacitive.part import CapacitiveExpectation, CapacitiveMethod, CapacitiveSensorPart
-from replay.sensing.kind import Drawing, Expected, SensorKind
+from replay.sensing.capacitive.part import (
+    ELECTROSTATIC,
+    CapacitiveExpectation,
+    CapacitiveMethod,
+    CapacitiveSensorPart,
+)
+from replay.sensing.kind import Drawing, Expected, Method, SensorKind, Suite
 
 if TYPE_CHECKING:
     from replay.sensing.capacitive.sensor import CapacitiveSensor
+    from replay.sensing.target import Target
 
 _COLOR = (216, 140, 60, 255)
 _CORNERS = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
@@ -25,7 +34,7 @@ class Capacitive(SensorKind):
     name = "capacitive"
     part = CapacitiveSensorPart
     method = CapacitiveMethod
-    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3}
+    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "bem": 1}
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation
     expected = (
@@ -50,8 +59,47 @@ class Capacitive(SensorKind):
             Plate(name=plate, T_link_plate=written.pose.transform(), half_size=0.5 * np.array(written.size))
             for plate, written in sorted(part.plates.items())
         )
-        same = part.model_dump(exclude={"link", "plates", "ignore"})
+        same = part.model_dump(exclude={"link", "plates", "back", "ignore"})
         return CapacitiveSensor(name=name, link=link, plates=plates, **same, ignored_links=ignored_links)
+
+    def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[tuple[str | int, ...], str]:
+        """See `SensorKind`: what is behind the plates."""
+        return {("back", index): name for index, name in enumerate(part.back)}
+
+    def with_shapes(
+        self, sensor: CapacitiveSensor, part: CapacitiveSensorPart, shapes: Mapping[str, Floats]
+    ) -> CapacitiveSensor:
+        """See `SensorKind`: what is behind the plates."""
+        return replace(sensor, back=tuple((name, shapes[name]) for name in part.back))
+
+    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
+        """See `SensorKind`."""
+        if method.method not in ELECTROSTATIC:
+            return super().suite(sensors, targets, method, savings=savings)
+        from replay.sensing.electrostatics.suite import ElectrostaticSuite
+
+        return ElectrostaticSuite(sensors, targets, method=method.method, savings=savings, **method.options())
+
+    def kernels(self, method: Method, *, savings: bool) -> tuple[Any, ...]:
+        """See `SensorKind`."""
+        if method.method not in ELECTROSTATIC:
+            return super().kernels(method, savings=savings)
+        from replay.sensing.electrostatics import suite
+
+        return suite.kernels(method=method.method, savings=savings)
+
+    def notes(
+        self,
+        parts: Mapping[str, CapacitiveSensorPart],
+        felt: Mapping[str, Sequence[str]],
+        earth: Mapping[str, float],
+        method: Any,
+    ) -> Iterator[tuple[tuple[str, ...], str]]:
+        """See `SensorKind`: units and bodies."""
+        if method.method in ELECTROSTATIC:
+            from replay.sensing.electrostatics.notes import notes
+
+            yield from notes(parts, felt, earth, method.method)
 
     def drawing(self, sensor: CapacitiveSensor) -> Drawing:
         """See `SensorKind`: the plates, and their outlines."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StrictInt, model_validator
 
-from replay.language.fields import Glob, Name, Part, Pose, Size2, When, in_order, needs_one
+from replay.language.fields import Flag, Glob, Name, Part, Pose, Size2, When, in_order, needs_one
 from replay.language.units import NUMBER, Capacitance, Permittivity, Quantity, StrayCapacitance, Supply, Voltage
 from replay.sensing.kind import Method
 
@@ -14,6 +14,10 @@ Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
+
+
+ELECTROSTATIC = ("bem",)
+"""The methods that compute charges on conductors."""
 
 
 class PlatePart(Part):
@@ -44,6 +48,10 @@ class CapacitiveSensorPart(Part):
     """"front" counts only what lies on the plates' +z side."""
     faces: Literal["all", "facing"] = "all"
     """"facing" counts only triangles whose outside faces the plate."""
+    back: tuple[Name, ...] = ()
+    """Shapes of the sensor's link that are a conductor behind the plates; only for the method bem."""
+    driven: Flag = False
+    """Whether what is behind the plates has their voltage, as a guard electrode, and not 0 V."""
     ignore: tuple[Glob, ...] = ()
     """Patterns of the names of links that are not sensed; the sensor's own link never is."""
 
@@ -51,17 +59,22 @@ class CapacitiveSensorPart(Part):
 class CapacitiveMethod(Method):
     """How capacitive sensors are computed."""
 
-    method: Literal["tree", "exact", "midpoint"] = "tree"
-    """A tree that meets a tolerance, every triangle in closed form, or the thesis's midpoint splitting."""
+    method: Literal["tree", "exact", "midpoint", "bem"] = "tree"
+    """A tree that meets a tolerance, every triangle in closed form, or the thesis's midpoint splitting: the thesis's
+    model. Or the electrostatics of conductors: bem, by boundary elements."""
     rtol: Tolerance | None = None
     """Relative tolerance of the sum; only for method tree, 1e-6 when left out."""
     splits: Annotated[StrictInt, Field(ge=0, le=8)] | None = None
     """Each triangle is split into 4^splits; only for method midpoint, 4 when left out."""
+    drive: Literal["alone", "together"] | None = None
+    """Whether output voltages are those of one sensor of a link driven at a time, or of all of them at once; only for
+    method bem, alone when left out."""
 
     @model_validator(mode="after")
     def _options_belong(self) -> Self:
         self._belongs("tree", "rtol")
         self._belongs("midpoint", "splits")
+        self._belongs("bem", "drive")
         return self
 
     def options(self) -> dict[str, Any]:
@@ -70,6 +83,8 @@ class CapacitiveMethod(Method):
             return {"rtol": 1e-6 if self.rtol is None else self.rtol}
         if self.method == "midpoint":
             return {"splits": 4 if self.splits is None else self.splits}
+        if self.method in ELECTROSTATIC:
+            return {"drive": self.drive or "alone"}
         return {}
 
 

@@ -53,6 +53,8 @@ class CapacitiveSensor:
         side: "front" counts what lies on the side of the plate's normal, "both" counts all.
         faces: "all" counts every triangle; "facing" counts those whose outer side the plate's centre lies on, strictly:
             n.(c - a) > 0 for the outward normal n, a corner a and the centre c.
+        back: shapes of the link that are a conductor behind the plates: name and triangles (n, 3, 3) [m], in the link's
+            frame; `driven` whether it has the plates' voltage, not 0 V. Only electrostatics knows of it.
         ignored_links: indices of links whose shapes are not sensed; the own link never is.
     """
 
@@ -65,6 +67,8 @@ class CapacitiveSensor:
     stray_capacitance: float = 0.0
     side: str = "front"
     faces: str = "all"
+    back: tuple[tuple[str, Floats], ...] = ()
+    driven: bool = False
     ignored_links: frozenset[int] = field(default_factory=frozenset)
 
     def __post_init__(self) -> None:

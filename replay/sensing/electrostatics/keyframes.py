@@ -1,0 +1,202 @@
+"""Readings of many frames from few that are solved: splines between keys, with an estimate of what that costs.
+
+A diagonal entry of the increase grows by orders of magnitude while a body comes near, and so does
+
+    E_k = sum over points j of the bodies, with area A_j,  of A_j phi_k(x_j)^2 / max(d_j, 3 mm),
+
+d_j the distance to the unit; their quotient hardly changes. So ln(dC_kk / E_k) is interpolated, E in every frame.
+Entries beside the diagonal and shares of shapes are interpolated over the root of the product of their diagonals.
+
+A motion falls into pieces, at stops, jumps and kinks of the script, and where what touches or is resolved changes. Each
+begins with five keys. The frame in the middle between two keys is solved and compared with the prediction of all keys
+so far: while it is missed by more than the tolerance, both halves are asked in the next round. What the last question
+between two keys missed is the error in time there. Pieces know nothing of each other, nor of other blocks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from replay.numerics.arrays import Flags, Floats, Integers
+from replay.sensing.electrostatics.bem import Reading
+from replay.sensing.electrostatics.spline import spline
+
+Solve = Callable[[int], Reading | None]
+
+_FIRST_KEYS = 5
+_FLOOR = 5e-3
+"""Share of the largest entry below which others need not be followed."""
+
+_SMALLEST = 1e-12
+"""Share of the largest entry that stands for 0 in a logarithm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """Readings of n frames, some of them solved.
+
+    Attributes:
+        increase, error: (n, k, k) [m]; the error in space and time.
+        shares: (n, shapes, k, k) [m].
+        solved: (n,) whether the frame was solved.
+    """
+
+    increase: Floats
+    error: Floats
+    shares: Floats
+    solved: Flags
+
+
+def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
+    """Return where motions begin and end: frames (first, last), each frame in one or, at a kink, in two.
+
+    Args:
+        points: (n, m, 3) [m], points of the bodies in the unit's frame.
+        state: (n,) what is constant within a piece.
+    """
+    n = len(points)
+    step = np.abs(np.diff(points, axis=0)).reshape(n - 1, -1).max(axis=1) if n > 1 else np.zeros(0)
+    bend = np.abs(np.diff(points, n=2, axis=0)).reshape(max(n - 2, 0), -1).max(axis=1) if n > 2 else np.zeros(0)
+    cut = state[1:] != state[:-1]
+    ends = []
+    for i in range(n - 1):
+        around = max(step[i - 1] if i else 0.0, step[i + 1] if i + 2 < n else 0.0)
+        jumps = n > 2 and step[i] > 5.0 * around and step[i] > 0.0
+        if cut[i] or jumps:
+            ends.append((i, i + 1))
+            continue
+        if i == 0:
+            continue
+        around = max(bend[i - 2] if i > 1 else 0.0, bend[i] if i < len(bend) else 0.0)
+        kinks = bend[i - 1] > 3.0 * around and bend[i - 1] > 0.02 * max(step[i - 1], step[i])
+        if kinks or (step[i] == 0.0) != (step[i - 1] == 0.0):
+            ends.append((i, i))
+    first, result = 0, []
+    for last, following in ends:
+        result.append((first, last))
+        first = following
+    return [*result, (first, n - 1)]
+
+
+def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tolerance: float) -> Between | None:
+    """Return the readings of all frames; None where a frame has none, so that each must be solved.
+
+    Args:
+        solve: solves a frame.
+        proxy: (n, k) E of each frame and electrode, > 0.
+        parts: see `pieces`.
+        tolerance: largest share of a diagonal entry that a prediction may miss.
+    """
+    known: dict[int, Reading] = {}
+
+    def reading(frame: int) -> Reading | None:
+        if frame not in known:
+            found = solve(frame)
+            if found is not None:
+                known[frame] = found
+        return known.get(frame)
+
+    found = [_Piece(reading, proxy, first, last).followed(tolerance) for first, last in parts]
+    shape = next((piece for piece in found if piece is not None), None)
+    if shape is None or any(piece is None for piece in found):
+        return None
+    n = len(proxy)
+    increase = np.empty((n, *shape.increase.shape[1:]))
+    error, shares = increase.copy(), np.empty((n, *shape.shares.shape[1:]))
+    solved = np.zeros(n, np.bool_)
+    for (first, last), piece in zip(parts, found, strict=True):
+        assert piece is not None
+        at = slice(first, last + 1)
+        increase[at], error[at], shares[at] = piece.increase, piece.error, piece.shares
+        solved[at] |= piece.solved
+    return Between(increase, error, shares, solved)
+
+
+class _Piece:
+    """Frames first .. last of one motion."""
+
+    def __init__(self, reading: Solve, proxy: Floats, first: int, last: int) -> None:
+        self._reading = reading
+        self._proxy = proxy[first : last + 1]
+        self._first = first
+        self._count = last - first + 1
+        self._keys: dict[int, Reading] = {}
+
+    def followed(self, tolerance: float) -> Between | None:
+        """Return the readings of the piece."""
+        start = np.unique(np.linspace(0, self._count - 1, _FIRST_KEYS).round().astype(int)).tolist()
+        if not self._solve(start):
+            return None
+        waiting = [(a, b) for a, b in pairwise(start) if b - a > 1]
+        missed = np.zeros(self._count)
+        while waiting:
+            asked = [(a + b) // 2 for a, b in waiting]
+            predicted = self._predicted(np.array(asked, dtype=np.float64))[0]
+            if not self._solve(asked):
+                return None
+            following = []
+            for (a, b), middle, guess in zip(waiting, asked, predicted, strict=True):
+                miss = self._miss(guess, self._keys[middle].increase)
+                missed[a + 1 : b] = miss
+                missed[middle] = 0.0
+                if miss > tolerance:
+                    following += [part for part in ((a, middle), (middle, b)) if part[1] - part[0] > 1]
+            waiting = following
+        increase, error, shares = self._predicted(np.arange(self._count, dtype=np.float64))
+        scale = np.sqrt(np.einsum("nkk->nk", increase))
+        error = error + missed[:, None, None] * scale[:, :, None] * scale[:, None, :]
+        solved = np.zeros(self._count, np.bool_)
+        for key, value in self._keys.items():
+            increase[key], error[key], shares[key], solved[key] = value.increase, value.error, value.shares, True
+        return Between(increase, error, shares, solved)
+
+    def _solve(self, frames: list[int]) -> bool:
+        for frame in frames:
+            found = self._reading(self._first + frame)
+            if found is None:
+                return False
+            self._keys[frame] = found
+        return True
+
+    def _miss(self, guess: Floats, value: Floats) -> float:
+        """Return by how much a prediction is missed, as a share of what may be missed of the worst entry."""
+        diagonal = np.abs(value.diagonal())
+        allowed = np.sqrt(diagonal + _FLOOR * diagonal.max())
+        return float(np.max(np.abs(guess - value) / np.maximum(allowed[:, None] * allowed, 1e-300)))
+
+    def _predicted(self, at: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return increases, errors and shares at frames of the piece."""
+        keys = sorted(self._keys)
+        readings = [self._keys[key] for key in keys]
+        value = np.stack([each.increase for each in readings])
+        m, k = value.shape[:2]
+        diagonal = np.einsum("nkk->nk", value)
+        diagonal = np.maximum(diagonal, np.maximum(_SMALLEST * diagonal.max(axis=1, keepdims=True), 1e-300))
+        root = np.sqrt(diagonal)
+        product = root[:, :, None] * root[:, None, :]
+        ratio = _each(math.log, diagonal / self._proxy[keys])
+        share = np.stack([each.shares for each in readings]) / product[:, None]
+        wrong = np.stack([each.error for each in readings]) / product
+        beside = (value / product).reshape(m, -1)
+        columns = np.concatenate([ratio, beside, share.reshape(m, -1)], axis=1)
+        places = np.array(keys, dtype=np.float64)
+        curve = spline(places, columns, at)
+        frames = at.astype(int)
+        root = np.sqrt(_each(math.exp, curve[:, :k]) * self._proxy[frames])
+        product = root[:, :, None] * root[:, None, :]
+        increase = curve[:, k : k + k * k].reshape(-1, k, k)
+        increase[:, np.arange(k), np.arange(k)] = 1.0
+        shares = curve[:, k + k * k :].reshape(len(at), -1, k, k)
+        flat = wrong.reshape(m, -1)
+        error = np.stack([np.interp(at, places, column) for column in flat.T], axis=1).reshape(-1, k, k)
+        return increase * product, error * product, shares * product[:, None]
+
+
+def _each(function: Callable[[float], float], values: Floats) -> Floats:
+    """Return a function of each value by the C library, which rounds alike whatever the processor's vectors."""
+    return np.array([function(value) for value in values.ravel().tolist()]).reshape(values.shape)
