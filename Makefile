@@ -80,10 +80,11 @@ bench: setup  ## speed against error, ours and other engines' (about four minute
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 
-pictures: $(VENV)/.test system  ## make the README's pictures, two of them from the recordings that `make run` left
+pictures: $(VENV)/.test system  ## make the README's pictures, three of them from the recordings that `make run` left
 	mkdir -p scenarios/pictures
 	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.6
 	$(BIN)/replay view $(RECORDINGS)/carm_parking/carm_parking.rrd --screenshot scenarios/pictures/carm_parking.png --at 4.2
+	$(BIN)/replay view $(RECORDINGS)/panda_meets_person/panda_meets_person.rrd --screenshot scenarios/pictures/panda_meets_person.png --at 2.8
 	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.thesis --model thesis2015 --no-rrd --overwrite
 	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.ours --no-rrd --overwrite
 	$(BIN)/replay diff $(RECORDINGS)/.thesis $(RECORDINGS)/.ours --rules scenarios/rules.yaml --html $(RECORDINGS)/.html || test $$? = 1
