@@ -79,14 +79,8 @@ def disagreements(seed, frames=4):
                 there = samples[:, link, :3, :3] @ corners.T + samples[:, link, :3, 3, None]
                 second = np.abs(np.diff(there, n=2, axis=0)).max(initial=0.0) * 64**2
                 worst = max(worst, 2.0 * np.sqrt(3.0) * second)
-                ways.append(
-                    [
-                        lambda x, c=c, k=link: (lambda T: T[:3, :3] @ c + T[:3, 3])(
-                            poses([t0 + x * (t1 - t0)]).world[0, k]
-                        )
-                        for c in corners
-                    ]
-                )
+                ways.append([lambda x, c=c, k=link: (lambda T: T[:3, :3] @ c + T[:3, 3])(
+                    poses([t0 + x * (t1 - t0)]).world[0, k]) for c in corners])
             asked += 1
             found = touch(ways, worst)
             false += found and columns.between[f, p] == Between.CLEAR
