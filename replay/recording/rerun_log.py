@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from replay.collision.columns import Level
 from replay.collision.passages import passages
 from replay.numerics import transforms
-from replay.numerics.arrays import Flags, Floats
+from replay.numerics.arrays import Bytes, Flags, Floats
 from replay.recording import blueprint
 from replay.recording.blueprint_parts import recording_blueprint
 from replay.recording.events import EventFinder
@@ -166,7 +166,7 @@ class RerunWriter:
                 self._send(block, rows, body_path(self._scene, self._scene.bodies[k]), colors)
         self._flashes(block, palettes.reshape(-1, 3), levels)
 
-    def _flashes(self, block: FrameBlock, palettes: NDArray[np.uint32], levels: NDArray[np.uint8]) -> None:
+    def _flashes(self, block: FrameBlock, palettes: NDArray[np.uint32], levels: Bytes) -> None:
         """Colour bodies while they are in a contact that no frame shows; `levels` are those of the frames (k, n)."""
         assert block.collision is not None
         found = passages(block.collision.crossings)
