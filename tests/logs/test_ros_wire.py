@@ -1,5 +1,6 @@
 """ROS messages from bytes that nobody vouches for: read within bounds, or no message."""
 
+import struct
 import time
 
 import numpy as np
@@ -103,3 +104,19 @@ def test_other_text_is_no_definition(text, message):
 
 def test_names_of_types():
     assert long_name("sensor_msgs/JointState") == long_name("sensor_msgs::msg::JointState") == ROS == long_name(ROS)
+
+
+def test_a_text_may_end_where_its_message_does_and_no_byte_later():
+    types = {"a/msg/A": (RosField("f", "string", 1, False),)}
+    text = struct.pack("<I", 4) + b"abc\0"
+    assert decode_cdr(types, "a/msg/A", b"\0\1\0\0" + text) == {"f": "abc"}
+    assert decode_cdr(types, "a/msg/A", b"\0\1\0\0" + struct.pack("<I", 1) + b"\0") == {"f": ""}
+    for cut in range(1, len(text)):
+        with pytest.raises(Exception):  # noqa: B017
+            decode_cdr(types, "a/msg/A", b"\0\1\0\0" + text[:-cut])
+    with pytest.raises(ValueError, match="does not end in a zero byte"):
+        decode_cdr(types, "a/msg/A", b"\0\1\0\0" + struct.pack("<I", 3) + b"abc")
+    ros1 = struct.pack("<I", 3) + b"abc"
+    assert decode_ros1(types, "a/msg/A", ros1) == {"f": "abc"}
+    with pytest.raises(ValueError, match="a text claims 3 bytes, more than it holds"):
+        decode_ros1(types, "a/msg/A", ros1[:-1])

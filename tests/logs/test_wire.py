@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf import FrameTransform_pb2, JointStates_pb2, LaserScan_pb2, Log_pb2
+from google.protobuf.descriptor import FieldDescriptor
 from hypothesis import given
 from hypothesis import strategies as st
 
 from replay.errors import InvalidValue
-from replay.logs.wire import MessageShape, shape_of
+from replay.logs.wire import MessageShape, Slot, shape_of
 
 
 def joints_shape() -> MessageShape:
@@ -108,3 +109,26 @@ def test_values_too_large_for_their_bytes_are_refused() -> None:
         shape.slots["timestamp.seconds"].write(rows, np.array([2**35]))
     with pytest.raises(InvalidValue):
         shape.slots["timestamp.nanos"].write(rows, np.array([-1]))
+
+
+@pytest.mark.parametrize("is_array", [False, True])
+def test_varints_written_longer_than_needed_are_read(is_array: bool) -> None:
+    """A writer may fill a varint with bytes that add nothing: 0x81 0x00 is 1, 0x80 0x00 is 0."""
+    rows = np.array([[9, 0x81, 0x00, 9], [9, 0x80, 0x00, 9], [9, 0x80, 0x01, 9], [9, 0xFF, 0x7F, 9]], dtype=np.uint8)
+    expected = {
+        FieldDescriptor.TYPE_BOOL: [True, False, True, True],
+        FieldDescriptor.TYPE_UINT32: [1, 0, 128, 16383],
+        FieldDescriptor.TYPE_INT64: [1, 0, 128, 16383],
+        FieldDescriptor.TYPE_SINT32: [-1, 0, 64, -8192],
+        FieldDescriptor.TYPE_SINT64: [-1, 0, 64, -8192],
+        FieldDescriptor.TYPE_ENUM: [1, 0, 128, 16383],
+    }
+    for kind, values in expected.items():
+        slot = Slot(kind, offset=1, width=2, count=1, is_array=is_array)
+        assert slot.end == 3
+        found = slot.read(rows)
+        assert found.reshape(-1).tolist() == values and found.ndim == 1 + is_array
+        if kind not in (FieldDescriptor.TYPE_SINT32, FieldDescriptor.TYPE_SINT64, FieldDescriptor.TYPE_BOOL):
+            again = np.full((4, 4), 9, dtype=np.uint8)
+            slot.write(again, found)
+            assert again.tolist() == rows.tolist()
