@@ -47,6 +47,9 @@ from replay.numerics.jit import entry, kernel, leaf_kernel, record
 LOOKS = 1024
 """Cap of a search: moments looked at. What is left then is undecided."""
 
+MOST_QUERIES = 1 << 15
+"""Another: pairs of convex sets decided, of bodies that have many near each other."""
+
 PARTS = 8
 """The shortest part that is looked at is this part of the resolution: so a meeting stays within the resolution, even
 where the parts just before it cannot be proven."""
@@ -280,7 +283,7 @@ def sweep(
     """
     frontier, bound = begin, np.inf
     unproven, any_unproven = begin, False
-    looks = 0
+    looks, asked = 0, r.counts[traversal.QUERIES]
     steps = wide if what == VOLUMES and volumes.kind == AABB else s
     shortest = max(resolution // PARTS, 1)
     while waiting > 0:
@@ -305,10 +308,11 @@ def sweep(
                 waiting -= 1
                 continue
         start = unproven if any_unproven else frontier
-        if meets and (abs(t - start) <= resolution or length <= shortest or looks >= LOOKS):
+        spent = looks >= LOOKS or r.counts[traversal.QUERIES] - asked >= MOST_QUERIES
+        if meets and (abs(t - start) <= resolution or length <= shortest or spent):
             r.bracket[0], r.bracket[1] = start, t
             return FOUND, 0.0
-        if length <= shortest or looks >= LOOKS or waiting >= DEPTH:
+        if length <= shortest or spent or waiting >= DEPTH:
             if not any_unproven:
                 any_unproven, unproven = True, frontier
             frontier, distance = t, d

@@ -1,6 +1,7 @@
 """What is called clear is clear by another conservative engine: ipctk's continuous collision of curved trajectories."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -63,6 +64,10 @@ def disagreements(seed, frames=4):
         states = motion.states(np.asarray(ns, dtype=np.float64) / 1e9)
         return linkage.forward(states.positions, states.free_poses)
 
+    def place(corner, link, t0, t1, x):
+        T = poses([t0 + x * (t1 - t0)]).world[0, link]
+        return T[:3, :3] @ corner + T[:3, 3]
+
     columns = CollisionPipeline(bodies, pairs, linkage, motion=motion).run(poses(time), time=time)
     asked, false, both = 0, 0, 0
     for f in range(1, frames):
@@ -79,8 +84,7 @@ def disagreements(seed, frames=4):
                 there = samples[:, link, :3, :3] @ corners.T + samples[:, link, :3, 3, None]
                 second = np.abs(np.diff(there, n=2, axis=0)).max(initial=0.0) * 64**2
                 worst = max(worst, 2.0 * np.sqrt(3.0) * second)
-                ways.append([lambda x, c=c, k=link: (lambda T: T[:3, :3] @ c + T[:3, 3])(
-                    poses([t0 + x * (t1 - t0)]).world[0, k]) for c in corners])
+                ways.append([partial(place, corner, link, t0, t1) for corner in corners])
             asked += 1
             found = touch(ways, worst)
             false += found and columns.between[f, p] == Between.CLEAR
