@@ -145,10 +145,12 @@ class Events(Sequence[Event]):
         mine = np.array([what.source == topic for what in self.transitions], dtype=np.bool_)
         return self._taken(np.flatnonzero(mine[self.code]))
 
-    def at_frames(self) -> Events:
-        """Return what frames show of these, at the times that frames tell: what begins and ends between two is not.
+    def at_frames(self, time: Integers) -> Events:
+        """Return what frames show of these, by frame: what begins and ends between two is not among them.
 
-        Each happens at the number of its frame, as `time` and as `earliest`.
+        Args:
+            time: of the recording's frames [ns]. What happens before a frame, after the one before, is told at its
+                time.
         """
         if not len(self):
             return Events.none()
@@ -162,8 +164,13 @@ class Events(Sequence[Event]):
         (first,) = np.nonzero(new)
         last = np.append(first[1:], len(order)) - 1
         first, last = order[first], order[last]
-        kept = np.sort(last[begins[self.code[first]] == begins[self.code[last]]])
-        return Events(self.frame[kept], self.frame[kept], self.code[kept], self.transitions, self.frame[kept])
+        shown = self._taken(last[begins[self.code[first]] == begins[self.code[last]]])
+        frame = np.minimum(shown.frame, len(time) - 1)
+        inside = (shown.time <= time[frame]) & (shown.time > np.where(frame > 0, time[frame - 1], -1))
+        told = Events(np.where(inside, time[frame], shown.time), shown.frame, shown.code, self.transitions)
+        ranks = {what: rank for rank, what in enumerate(sorted(self.transitions, key=repr))}
+        rank = np.array([ranks[what] for what in self.transitions], dtype=np.int64)[told.code]
+        return told._taken(np.lexsort((rank, told.frame)))
 
     def columns(self) -> dict[str, NDArray[np.generic]]:
         """Return time and earliest [ns], frame, kind, begins and subject of all events, (n,) each.

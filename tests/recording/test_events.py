@@ -141,13 +141,15 @@ def test_frames_do_not_show_what_lies_between_them() -> None:
     a, b = Transition("contact", True, "p", "/collision"), Transition("contact", False, "p", "/collision")
     other = Transition("contact", True, "q", "/collision")
     frame = np.array([1, 1, 3, 3, 3, 3, 4])  # begins and ends before 1; begins, ends and begins before 3; ends before 4
-    events = Events(10 * frame, frame, np.array([0, 1, 0, 2, 1, 0, 1]), (a, b, other), 10 * frame - 1)
-    assert [(e.frame, e.begins, e.subject) for e in events.at_frames()] == [
-        (3, True, "q"),
-        (3, True, "p"),
-        (4, False, "p"),
+    events = Events(10 * frame - 2, frame, np.array([0, 1, 0, 2, 1, 0, 1]), (a, b, other), 10 * frame - 3)
+    time = 10 * np.arange(5)
+    assert [(e.time, e.frame, e.begins, e.subject) for e in events.at_frames(time)] == [
+        (30, 3, True, "p"),
+        (30, 3, True, "q"),
+        (40, 4, False, "p"),
     ]
-    assert Events.none().at_frames() == Events.none()
+    assert dataclasses.replace(events, time=events.time + 5).at_frames(time)[0].time == 33, "not before its frame"
+    assert Events.none().at_frames(time) == Events.none()
 
 
 @pytest.fixture(scope="module")
