@@ -171,7 +171,7 @@ def test_notes_say_what_is_one_unit_and_how_bodies_are_earthed(tmp_path: Path) -
     text = "\n".join(note.message for note in notes(scenario))
     assert "left, right on sensor are one unit with sheet behind its plates; it feels target (100 pF to earth)" in text
     assert "sensors.capacitive.left.side" in text and "sensors.capacitive.left.stray_capacitance" in text
-    assert not notes(scenario, type(scenario.model)())
+    assert not notes(scenario, model=type(scenario.model)())
 
 
 def test_a_recording_has_the_columns_and_one_of_another_method_has_not(tmp_path: Path) -> None:
