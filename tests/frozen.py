@@ -1,6 +1,6 @@
 """Frozen readings of every version of every method: `make freeze` adds those of revisions that have none yet.
 
-They are the signals of one scene, each with the method it depends on: the bounds say where volumes meet, the narrow
+They are the signals of a scene, each with the method it depends on: the bounds say where volumes meet, the narrow
 phase what convex shapes do, the pieces what concave shapes do. Numbers are kept of each fourth frame, states of all, as
 the frames in which they change. What two readings may be apart is what scenarios/rules.yaml accepts.
 """
@@ -29,16 +29,19 @@ RULES = Path(__file__).parents[1] / "scenarios" / "rules.yaml"
 EVERY = 4
 CONCAVE = ("arm/bow", "tool/bracket")
 SCENE = "scene"
+OWN_SCENES = {"capacitive.bem": "conductors"}
+"""Versions that are asked of a scene of their own."""
 
 
 @functools.cache
 def recording_of(method):
-    """The scene, recorded under a version of a method, such as "distance.rays"; defaults for all else."""
+    """Its scene, recorded under a version of a method, such as "distance.rays"; defaults for all else."""
     kind, *option = method.split(".")
     choice = {option[0]: option[1]} if len(option) == 2 else {"method": "".join(option)}
     model = Model.model_validate({} if method == SCENE else {kind: choice})
     with tempfile.TemporaryDirectory() as folder:
-        return read(record(load(FOLDER / "scene.yaml"), folder, model=model, rrd=False).mcap)
+        scenario = load(FOLDER / f"{OWN_SCENES.get(method, SCENE)}.yaml")
+        return read(record(scenario, folder, model=model, rrd=False).mcap)
 
 
 def signals_of(method):
@@ -93,7 +96,7 @@ def readings(method):
         if part is not None and not rules.tolerance(name).ignore:
             found[name] = kept(part, states)
     if method == SCENE:
-        for shape in build(load(FOLDER / "scene.yaml")).shapes:
+        for shape in build(load(FOLDER / f"{SCENE}.yaml")).shapes:
             corners = shape.solid.triangles
             found[f"corners of {shape.name}"] = [len(corners), *corners.std(axis=(0, 1)).round(12).tolist()]
     return found

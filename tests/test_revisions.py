@@ -51,7 +51,8 @@ def test_readings_of_this_revision_are_frozen(method, changes):
 def test_the_scene_tells_any_two_versions_of_a_method_apart(family):
     if family == "collision.narrowphase":
         return  # two engines that are both right say the same of convex shapes
-    versions = [READINGS[frozen.key_of(m)] for m in METHOD_REVISIONS if m.rpartition(".")[0] == family]
+    of_one_scene = [m for m in METHOD_REVISIONS if m.rpartition(".")[0] == family and m not in frozen.OWN_SCENES]
+    versions = [READINGS[frozen.key_of(m)] for m in of_one_scene]
     for a, b in itertools.combinations(versions, 2):
         assert a.keys() == b.keys()
         assert a != b
