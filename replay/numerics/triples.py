@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from replay.numerics.jit import inlined_kernel, kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel
 
 Triple = tuple[float, float, float]
 
@@ -48,7 +48,7 @@ def cross(a: Triple, b: Triple) -> Triple:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@kernel
+@leaf_kernel
 def norm(a: Triple) -> float:
     """Return the length of a, without underflow."""
     square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]

@@ -21,7 +21,7 @@ from replay.sensing.electrostatics import cholesky
 from replay.sensing.electrostatics.algebra import Response, response
 from replay.sensing.electrostatics.influence import fill_influences
 from replay.sensing.electrostatics.panels import Panels, joined
-from replay.sensing.electrostatics.placement import Placement
+from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.refinement import near_tree, refined
 from replay.sensing.electrostatics.unit import Unit
 
@@ -43,7 +43,7 @@ _ROUNDING = 2e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class BemReading:
     """What bodies change at a unit with k electrodes, in units of 4 pi eps0.
 
     Attributes:
@@ -57,7 +57,7 @@ class Reading:
     shares: Floats
 
 
-def read(unit: Unit, placement: Placement) -> Reading | None:
+def read(unit: Unit, placement: PosedBodies) -> BemReading | None:
     """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer.
 
     Raises:
@@ -74,7 +74,7 @@ def read(unit: Unit, placement: Placement) -> Reading | None:
     value, share = _extrapolated(values), _extrapolated(shares)
     share += (value - share.sum(axis=0)) * np.abs(share) / np.maximum(np.abs(share).sum(axis=0), 1e-300)
     error = 0.5 * np.abs(value - values[2]) + _ROUNDING * np.abs(value) + 0.5 * np.abs(found[2][1])
-    return Reading(value, error, share)
+    return BemReading(value, error, share)
 
 
 def _extrapolated(v: Sequence[Floats]) -> Floats:
@@ -83,7 +83,7 @@ def _extrapolated(v: Sequence[Floats]) -> Floats:
     return np.asarray(v[2] + last / (np.clip(ratio, 1.8, 4.0) - 1.0))
 
 
-def _scale(unit: Unit, placement: Placement) -> float:
+def _scale(unit: Unit, placement: PosedBodies) -> float:
     """Return how much coarser all meshes are made for the finest to have no more than MOST_UNKNOWNS panels."""
     scale = 1.0
     while (count := _count(*meshes(unit, placement, scale * LEVELS[-1]))) > MOST_UNKNOWNS:
@@ -98,7 +98,7 @@ def _count(image: Panels, parts: list[Panels]) -> int:
     return len(image.area) + sum(len(part.area) for part in parts)
 
 
-def _level(unit: Unit, placement: Placement, fineness: float) -> tuple[Response, Floats] | None:
+def _level(unit: Unit, placement: PosedBodies, fineness: float) -> tuple[Response, Floats] | None:
     """Return what bodies change at one fineness, and what of it the extrapolation of phi makes."""
     image, parts = meshes(unit, placement, fineness)
     bodies = joined(parts)
@@ -114,7 +114,7 @@ def _level(unit: Unit, placement: Placement, fineness: float) -> tuple[Response,
     return found, change + change.T
 
 
-def meshes(unit: Unit, placement: Placement, fineness: float) -> tuple[Panels, list[Panels]]:
+def meshes(unit: Unit, placement: PosedBodies, fineness: float) -> tuple[Panels, list[Panels]]:
     """Return the panels of the unit for images, and those of each shape, for one pose at one fineness."""
     smallest = min(_SMALLEST, placement.gap) * fineness
     near_unit = near_tree(unit.outline)

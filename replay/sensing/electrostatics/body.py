@@ -21,7 +21,7 @@ _LARGEST, _SHARE = 0.13, 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class ConductorBody:
     """A conductor of one or more shapes, which move as one.
 
     Attributes:

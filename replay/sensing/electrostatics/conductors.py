@@ -17,7 +17,7 @@ import numpy as np
 from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats, Integers
-from replay.sensing.electrostatics.body import Body
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.unit import Electrode, Unit
 from replay.sensing.target import Target
 
@@ -50,7 +50,7 @@ class Station:
     behind: Floats
     driven: bool
     unit: Unit
-    bodies: tuple[Body, ...]
+    bodies: tuple[ConductorBody, ...]
     links: tuple[int, ...]
     objects: Integers
 
@@ -101,7 +101,7 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station
             found = [k for k, target in enumerate(targets) if target.link == body]
             name = targets[found[0]].name.partition("/")[0]
             earth = targets[found[0]].earth / FOUR_PI_EPSILON
-            bodies.append(_with_area(Body(name, tuple(targets[k].triangles for k in found), earth)))
+            bodies.append(_with_area(ConductorBody(name, tuple(targets[k].triangles for k in found), earth)))
             links.append(body)
             objects += found
         result.append(
@@ -144,7 +144,7 @@ def _rectangle(plate: Any) -> Floats:
     return np.ascontiguousarray(corners[[[0, 1, 2], [0, 2, 3]]])
 
 
-def _with_area(body: Body) -> Body:
+def _with_area(body: ConductorBody) -> ConductorBody:
     if not any(len(faces.panels.area) for faces in body.faces):
         raise InvalidValue(f"body {body.name!r}", "triangles without area", "must have area")
     return body

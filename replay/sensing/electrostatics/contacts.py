@@ -11,7 +11,7 @@ from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.conductors import Station
 from replay.sensing.electrostatics.gap import gaps
-from replay.sensing.electrostatics.placement import RESOLVED, TOUCHING, Placement
+from replay.sensing.electrostatics.placement import RESOLVED, TOUCHING, PosedBodies
 from replay.sensing.target import Target
 
 NEAR = 5e-3
@@ -30,7 +30,7 @@ class Stand:
         touching: (n, k, shapes) whether a shape touches a plate, or holds it.
     """
 
-    placements: tuple[Placement, ...]
+    placements: tuple[PosedBodies, ...]
     gap: Floats
     touching: Flags
 
@@ -121,16 +121,16 @@ def _placed(
     gap: Floats,
     conductors: Integers,
     least: float,
-) -> Placement:
+) -> PosedBodies:
     """Return a pose as it is solved."""
     if least >= RESOLVED:
-        return Placement(station.bodies, list(T), conductors, least)
+        return PosedBodies(station.bodies, list(T), conductors, least)
     poses = [pose.copy() for pose in T]
     cut = bool((gap < TOUCHING).any())
     for body in np.flatnonzero((gap < RESOLVED) & (gap >= TOUCHING)):
         own = [target for target, of in zip(targets, body_of, strict=True) if of == body]
         cut |= not _moved_away(station.surface, own, poses[body])
-    return Placement(station.bodies, poses, conductors, RESOLVED, cut)
+    return PosedBodies(station.bodies, poses, conductors, RESOLVED, cut)
 
 
 def _moved_away(surface: Floats, own: list[Target], pose: Floats) -> bool:

@@ -23,10 +23,10 @@ from itertools import pairwise
 import numpy as np
 
 from replay.numerics.arrays import Flags, Floats, Integers
-from replay.sensing.electrostatics.bem import Reading
+from replay.sensing.electrostatics.bem import BemReading
 from replay.sensing.electrostatics.spline import spline
 
-Solve = Callable[[int], Reading | None]
+Solve = Callable[[int], BemReading | None]
 
 _FIRST_KEYS = 5
 _FLOOR = 5e-3
@@ -37,7 +37,7 @@ _SMALLEST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Between:
+class Followed:
     """Readings of n frames, some of them solved.
 
     Attributes:
@@ -83,7 +83,7 @@ def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
     return [*result, (first, n - 1)]
 
 
-def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tolerance: float) -> Between | None:
+def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tolerance: float) -> Followed | None:
     """Return the readings of all frames; None where a frame has none, so that each must be solved.
 
     Args:
@@ -92,9 +92,9 @@ def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tole
         parts: see `pieces`.
         tolerance: largest share of a diagonal entry that a prediction may miss.
     """
-    known: dict[int, Reading] = {}
+    known: dict[int, BemReading] = {}
 
-    def reading(frame: int) -> Reading | None:
+    def reading(frame: int) -> BemReading | None:
         if frame not in known:
             found = solve(frame)
             if found is not None:
@@ -114,7 +114,7 @@ def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tole
         at = slice(first, last + 1)
         increase[at], error[at], shares[at] = piece.increase, piece.error, piece.shares
         solved[at] |= piece.solved
-    return Between(increase, error, shares, solved)
+    return Followed(increase, error, shares, solved)
 
 
 class _Piece:
@@ -125,9 +125,9 @@ class _Piece:
         self._proxy = proxy[first : last + 1]
         self._first = first
         self._count = last - first + 1
-        self._keys: dict[int, Reading] = {}
+        self._keys: dict[int, BemReading] = {}
 
-    def followed(self, tolerance: float) -> Between | None:
+    def followed(self, tolerance: float) -> Followed | None:
         """Return the readings of the piece."""
         start = np.unique(np.linspace(0, self._count - 1, _FIRST_KEYS).round().astype(int)).tolist()
         if not self._solve(start):
@@ -153,7 +153,7 @@ class _Piece:
         solved = np.zeros(self._count, np.bool_)
         for key, value in self._keys.items():
             increase[key], error[key], shares[key], solved[key] = value.increase, value.error, value.shares, True
-        return Between(increase, error, shares, solved)
+        return Followed(increase, error, shares, solved)
 
     def _solve(self, frames: list[int]) -> bool:
         for frame in frames:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from replay.numerics.arrays import Flags, Floats, Integers
-from replay.sensing.electrostatics.bem import Reading
+from replay.sensing.electrostatics.bem import BemReading
 from replay.sensing.electrostatics.contacts import Stand
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class PoseTrack:
     """The poses that occur in n frames.
 
     Attributes:
@@ -25,16 +25,16 @@ class Track:
     pose_of: Integers
 
     @staticmethod
-    def every(T: Floats) -> Track:
+    def every(T: Floats) -> PoseTrack:
         """Return the poses (n, bodies, 4, 4) of n frames as they are."""
-        return Track(T, np.arange(len(T)))
+        return PoseTrack(T, np.arange(len(T)))
 
     @staticmethod
-    def of(T: Floats) -> Track:
+    def of(T: Floats) -> PoseTrack:
         """Return the poses (n, bodies, 4, 4) of n frames, those that are equal bit for bit once."""
         seen: dict[bytes, int] = {}
         pose_of = np.array([seen.setdefault(pose.tobytes(), len(seen)) for pose in T], dtype=np.intp)
-        return Track(T[np.unique(pose_of, return_index=True)[1]], pose_of)
+        return PoseTrack(T[np.unique(pose_of, return_index=True)[1]], pose_of)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Solved:
         return Solved(zero, zero, shares, np.zeros((frames, sensors, 0), np.bool_), np.zeros(frames, np.bool_))
 
     @staticmethod
-    def of(stand: Stand, readings: Sequence[Reading | None], electrodes: int) -> Solved:
+    def of(stand: Stand, readings: Sequence[BemReading | None], electrodes: int) -> Solved:
         """Return readings of poses side by side."""
         n, shapes = len(readings), stand.touching.shape[2]
         increase = np.full((n, electrodes, electrodes), np.nan)

@@ -15,7 +15,7 @@ import numpy as np
 
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats, Integers
-from replay.sensing.electrostatics.body import Body
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.gap import on_surface
 from replay.sensing.electrostatics.panels import Panels, chosen, moved
 
@@ -31,7 +31,7 @@ RESOLVED = 3e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class PosedBodies:
     """Bodies in one pose.
 
     Attributes:
@@ -42,7 +42,7 @@ class Placement:
         cut: whether panels nearer to the unit than `RESOLVED` are left out, as of bodies that overlap it.
     """
 
-    bodies: Sequence[Body]
+    bodies: Sequence[ConductorBody]
     poses: Sequence[Floats]
     conductors: Integers
     gap: float

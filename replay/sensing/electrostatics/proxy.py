@@ -10,10 +10,10 @@ from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
 from replay.numerics.jit import entry, kernel
-from replay.sensing.electrostatics.body import Body
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.influence import point_potentials
 from replay.sensing.electrostatics.panels import joined
-from replay.sensing.electrostatics.placement import RESOLVED, Placement
+from replay.sensing.electrostatics.placement import RESOLVED, PosedBodies
 from replay.sensing.electrostatics.refinement import bounded
 from replay.sensing.electrostatics.unit import Unit
 
@@ -42,7 +42,7 @@ class Proxy:
         bodies: what is before it.
     """
 
-    def __init__(self, unit: Unit, surface: Floats, bodies: tuple[Body, ...]) -> None:
+    def __init__(self, unit: Unit, surface: Floats, bodies: tuple[ConductorBody, ...]) -> None:
         self._unit = unit
         self._surface, self._tree = surface, triangle_tree(surface)
         self._points, self._areas = [], []
@@ -56,7 +56,7 @@ class Proxy:
             self._points.append(pieces.centroid)
             self._areas.append(pieces.area)
 
-    def of(self, placement: Placement) -> Floats:
+    def of(self, placement: PosedBodies) -> Floats:
         """Return E (k,) [m], > 0, of one pose."""
         turned = [transforms.apply(pose, points) for points, pose in zip(self._points, placement.poses, strict=True)]
         points = np.ascontiguousarray(np.concatenate(turned))

@@ -19,7 +19,7 @@ from replay.sensing.electrostatics.circuit import output_voltages
 from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON, Station, stations
 from replay.sensing.electrostatics.contacts import Stand, stand
 from replay.sensing.electrostatics.keyframes import between_keys, pieces
-from replay.sensing.electrostatics.motion import Solved, Track
+from replay.sensing.electrostatics.motion import PoseTrack, Solved
 from replay.sensing.electrostatics.proxy import Proxy
 from replay.sensing.target import Target
 
@@ -106,12 +106,12 @@ class ElectrostaticSuite:
         if not station.bodies:
             return Solved.nothing(frames, k, len(station.plates))
         T = np.stack([poses.relative(station.link, link) for link in station.links], axis=1)
-        track = Track.of(T) if self._savings else Track.every(T)
+        track = PoseTrack.of(T) if self._savings else PoseTrack.every(T)
         targets = [self.targets[column] for column in station.objects]
         standing = stand(station, targets, np.ascontiguousarray(track.poses))
-        readings: dict[int, bem.Reading | None] = {}
+        readings: dict[int, bem.BemReading | None] = {}
 
-        def solve(pose: int) -> bem.Reading | None:
+        def solve(pose: int) -> bem.BemReading | None:
             if pose not in readings:
                 readings[pose] = bem.read(station.unit, standing.placements[pose])
                 self.solved += 1

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.geometry import primitives
-from replay.sensing.electrostatics.body import Body
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON
-from replay.sensing.electrostatics.placement import Placement
+from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.unit import Electrode, Unit
 
 Floats = NDArray[np.float64]
@@ -93,13 +93,13 @@ def surface(shape: dict[str, Any]) -> Floats:
     return np.ascontiguousarray(local @ np.array(shape["R"]).T + np.array(shape["t"]))
 
 
-def of_case(case: dict[str, Any]) -> tuple[Unit, Placement]:
+def of_case(case: dict[str, Any]) -> tuple[Unit, PosedBodies]:
     """Return the unit and the bodies of a case."""
     unit = Unit([Electrode(e["name"], tuple(map(surface, e["shapes"]))) for e in case["electrodes"]])
     earth = {"grounded": np.inf, "floating": 0.0}
-    bodies = [Body(f"{k}", (surface(shape),), earth[shape["state"]]) for k, shape in enumerate(case["bodies"])]
+    bodies = [ConductorBody(f"{k}", (surface(shape),), earth[shape["state"]]) for k, shape in enumerate(case["bodies"])]
     return unit, placed(*bodies, gap=case["min_gap_m"] or 5e-3)
 
 
-def placed(*bodies: Body, gap: float = 5e-3, poses: list[Floats] | None = None) -> Placement:
-    return Placement(bodies, poses or [np.eye(4)] * len(bodies), np.arange(len(bodies)), gap)
+def placed(*bodies: ConductorBody, gap: float = 5e-3, poses: list[Floats] | None = None) -> PosedBodies:
+    return PosedBodies(bodies, poses or [np.eye(4)] * len(bodies), np.arange(len(bodies)), gap)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from replay.sensing.electrostatics import bem
-from replay.sensing.electrostatics.body import Body
-from replay.sensing.electrostatics.placement import Placement
+from replay.sensing.electrostatics.body import ConductorBody
+from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.unit import Electrode, Unit
 from tests.sensing.electrostatics.made_cases import CASES, PICO, icosphere, of_case, placed, rectangle, shifted
 
@@ -51,7 +51,7 @@ def two_plates() -> Unit:
 
 def test_a_floating_body_is_neutral_and_every_increase_symmetric_and_above_0() -> None:
     unit = two_plates()
-    placement = placed(Body("ball", (shifted(icosphere(0.03, 2), 0.01, 0.0, 0.06),), 0.0), gap=0.03)
+    placement = placed(ConductorBody("ball", (shifted(icosphere(0.03, 2), 0.01, 0.0, 0.06),), 0.0), gap=0.03)
     found = bem._level(unit, placement, 1.5)
     assert found is not None
     response = found[0]
@@ -63,7 +63,9 @@ def test_a_floating_body_is_neutral_and_every_increase_symmetric_and_above_0() -
 def test_a_floating_sphere_around_a_sphere_changes_nothing_and_a_grounded_one_what_the_closed_form_says() -> None:
     unit = Unit([Electrode("ball", (icosphere(0.01, 2),))])
     shell = icosphere(0.03, 2)
-    floating, grounded = (bem._level(unit, placed(Body("shell", (shell,), earth)), 1.5) for earth in (0.0, np.inf))
+    floating, grounded = (
+        bem._level(unit, placed(ConductorBody("shell", (shell,), earth)), 1.5) for earth in (0.0, np.inf)
+    )
     assert floating is not None and grounded is not None
     increase = grounded[0].increase[0, 0]
     assert increase == pytest.approx(0.01 * 0.03 / 0.02 - 0.01, rel=3e-2)  # of spheres; these have facets
@@ -72,8 +74,8 @@ def test_a_floating_sphere_around_a_sphere_changes_nothing_and_a_grounded_one_wh
 
 def test_nothing_is_felt_behind_a_grounded_shell() -> None:
     unit = Unit([Electrode("ball", (icosphere(0.01, 1),))])
-    shell = Body("shell", (icosphere(0.03, 2),))
-    outside = Body("outside", (shifted(icosphere(0.02, 1), 0.08, 0.0, 0.0),))
+    shell = ConductorBody("shell", (icosphere(0.03, 2),))
+    outside = ConductorBody("outside", (shifted(icosphere(0.02, 1), 0.08, 0.0, 0.0),))
     alone, both = (bem._level(unit, placed(*bodies), 1.5) for bodies in ((shell,), (shell, outside)))
     assert alone is not None and both is not None
     assert both[0].increase[0, 0] == pytest.approx(alone[0].increase[0, 0], rel=1e-4)
@@ -83,7 +85,9 @@ def test_nothing_is_felt_behind_a_grounded_shell() -> None:
 def test_earth_goes_from_floating_to_grounded_and_shares_add_up() -> None:
     unit = two_plates()
     shapes = (shifted(icosphere(0.03, 2), 0.0, 0.0, 0.06), rectangle(0.05, 0.05, 0.12))
-    found = [bem._level(unit, placed(Body("both", shapes, earth)), 1.5) for earth in (0.0, 0.01, 1.0, 1e6, np.inf)]
+    found = [
+        bem._level(unit, placed(ConductorBody("both", shapes, earth)), 1.5) for earth in (0.0, 0.01, 1.0, 1e6, np.inf)
+    ]
     readings = [each[0] for each in found if each is not None]
     values = [reading.increase[0, 0] for reading in readings]
     assert values == sorted(values) and values[0] < 0.9 * values[-1]
@@ -95,9 +99,9 @@ def test_earth_goes_from_floating_to_grounded_and_shares_add_up() -> None:
 def test_bodies_that_touch_are_one_conductor() -> None:
     unit = two_plates()
     halves = [shifted(rectangle(0.04, 0.08, 0.03), x, 0.0, 0.0) for x in (-0.02, 0.02)]
-    one = bem._level(unit, placed(Body("whole", (np.concatenate(halves),), 0.0)), 1.5)
-    parts = tuple(Body(str(k), (half,), 0.0) for k, half in enumerate(halves))
-    two = bem._level(unit, Placement(parts, [np.eye(4)] * 2, np.zeros(2, np.int64), 5e-3), 1.5)
+    one = bem._level(unit, placed(ConductorBody("whole", (np.concatenate(halves),), 0.0)), 1.5)
+    parts = tuple(ConductorBody(str(k), (half,), 0.0) for k, half in enumerate(halves))
+    two = bem._level(unit, PosedBodies(parts, [np.eye(4)] * 2, np.zeros(2, np.int64), 5e-3), 1.5)
     apart = bem._level(unit, placed(*parts), 1.5)
     assert one is not None and two is not None and apart is not None
     assert two[0].increase == pytest.approx(one[0].increase, rel=3e-2)  # of two meshes of one coarse level
@@ -107,8 +111,10 @@ def test_bodies_that_touch_are_one_conductor() -> None:
 def test_a_shape_that_is_there_twice_counts_once() -> None:
     unit = two_plates()
     plate = rectangle(0.06, 0.06, 0.03)
-    once = bem._level(unit, placed(Body("once", (plate,))), 1.5)
-    twice = bem._level(unit, placed(Body("twice", (plate, plate[::-1], np.concatenate([plate, plate[:, ::-1]])))), 1.5)
+    once = bem._level(unit, placed(ConductorBody("once", (plate,))), 1.5)
+    twice = bem._level(
+        unit, placed(ConductorBody("twice", (plate, plate[::-1], np.concatenate([plate, plate[:, ::-1]])))), 1.5
+    )
     assert once is not None and twice is not None
     assert twice[0].increase == pytest.approx(once[0].increase, rel=1e-12)
 
@@ -116,4 +122,4 @@ def test_a_shape_that_is_there_twice_counts_once() -> None:
 def test_more_unknowns_than_fit_are_refused_with_their_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bem, "MOST_UNKNOWNS", 50)
     with pytest.raises(Exception, match=r"unknowns of method bem = \d+: must be at most 50"):
-        bem.read(two_plates(), placed(Body("ball", (shifted(icosphere(0.03, 2), 0.0, 0.0, 0.06),))))
+        bem.read(two_plates(), placed(ConductorBody("ball", (shifted(icosphere(0.03, 2), 0.0, 0.0, 0.06),))))

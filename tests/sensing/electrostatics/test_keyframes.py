@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from replay.sensing.electrostatics.bem import Reading
-from replay.sensing.electrostatics.keyframes import Between, between_keys, pieces
+from replay.sensing.electrostatics.bem import BemReading
+from replay.sensing.electrostatics.keyframes import Followed, between_keys, pieces
 from replay.sensing.electrostatics.spline import spline
 
 Floats = NDArray[np.float64]
@@ -22,13 +22,13 @@ def line(x: Floats) -> Floats:
 
 def follow(
     values: Callable[[int], Floats], frames: int, proxy: Floats, tolerance: float = 5e-3
-) -> tuple[Between, list[int]]:
+) -> tuple[Followed, list[int]]:
     asked: list[int] = []
 
-    def solve(frame: int) -> Reading:
+    def solve(frame: int) -> BemReading:
         asked.append(frame)
         value = values(frame)
-        return Reading(value, 1e-3 * np.abs(value), value[None])
+        return BemReading(value, 1e-3 * np.abs(value), value[None])
 
     found = between_keys(solve, proxy, [(0, frames - 1)], tolerance)
     assert found is not None and sorted(set(asked)) == np.flatnonzero(found.solved).tolist()
