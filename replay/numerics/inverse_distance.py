@@ -42,7 +42,7 @@ from replay.numerics.gauss import (
     WEIGHTS_12,
     WEIGHTS_16,
 )
-from replay.numerics.jit import kernel
+from replay.numerics.jit import kernel, leaf_kernel
 from replay.numerics.triples import UNDERFLOW, Triple, along, cross, dot, minus, norm
 
 _FAR = 3.0
@@ -52,7 +52,7 @@ _TINY = 1e-60
 """Size below which a triangle is scaled up, so that fourth powers stay above UNDERFLOW."""
 
 
-@kernel
+@leaf_kernel
 def _segment_integral(length: float, near: float, height: float, r_near: float, r_far: float) -> float:
     """Return int ds/sqrt(s^2 + R0^2) over s = near .. near + length, near >= -length/2; inf through the origin."""
     total = r_near + r_far
@@ -80,7 +80,7 @@ def _segment_integral(length: float, near: float, height: float, r_near: float, 
     return math.log(square / (2.0 * bracket))
 
 
-@kernel
+@leaf_kernel
 def mean_over_segment(p: Triple, q: Triple) -> float:
     """Return the mean of 1/|r| [1/m] over the segment from p to q [m]; inf when it contains the origin."""
     r_near, r_far = norm(p), norm(q)

@@ -287,7 +287,7 @@ def test_the_last_words_find_room_on_a_disk_that_others_have_filled(tmp_path):
     script = """if True:
         import os
         from pathlib import Path
-        from replay.batch.case import CaseResult, Status
+        from replay.batch.case import CaseResult
         from replay.batch.run_file import RunFile
         file = RunFile(Path("full"), ["a", "b"], workers=1)
         file.begin([])

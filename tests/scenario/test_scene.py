@@ -31,11 +31,11 @@ def build_text(text, **files):
 
 def test_everything_is_listed_once_sorted_by_name(full):
     assert isinstance(full.layout, Layout)
-    assert full.layout.links == ("arc", "detector", "doctor", "patient", "stand", "wedge")
-    assert full.layout.joints == ("arc_rotation", "lift", "turn")
-    assert full.layout.joint_units == ("rad", "m", "rad")
+    assert full.layout.links == ("arc", "detector", "doctor", "gear", "patient", "slide", "stand", "wedge", "world")
+    assert full.layout.joints == ("arc_rotation", "gear", "lift", "slide", "turn")
+    assert full.layout.joint_units == ("rad", "rad", "m", "m", "rad")
     shapes = tuple(shape.name for shape in full.shapes)
-    assert shapes == tuple(sorted(shapes)) and len(shapes) == 9
+    assert shapes == tuple(sorted(shapes)) and len(shapes) == 12
     assert full.layout.shapes == tuple(name for name in shapes if name != "wedge/mesh")
     assert full.layout.objects == full.layout.shapes == tuple(target.name for target in full.targets)
     assert full.layout.pairs == tuple(sorted(full.layout.pairs))
@@ -76,7 +76,7 @@ def test_sensors_are_placed_and_know_what_they_ignore(full):
 def test_the_script_drives_the_linkage_as_written(full):
     seconds = full.seconds(0, full.frames)
     states = sample(full.linkage, full.script, seconds)
-    assert states.positions.shape == (301, 3)
+    assert states.positions.shape == (301, 5)
     turn = full.layout.joints.index("turn")
     assert states.positions[:, turn] == pytest.approx(np.pi / 2)  # no script: holds its initial position
     arc = full.layout.joints.index("arc_rotation")
