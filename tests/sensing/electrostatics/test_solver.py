@@ -116,7 +116,8 @@ def test_two_spheres_and_a_sphere_over_a_plane(distance: float) -> None:
 def test_parallel_squares_far_apart_and_close() -> None:
     """Far: two charges at their distance. Close: the plate capacitor with a fringe at its edges (Kirchhoff 1877).
 
-    Far, panels of 12 to 18 an edge come to 1.4e-4, of 15 to 23 to 1.2e-4: what is left is the rule for panels that touch.
+    Far, panels of 12 to 18 an edge come to 1.4e-4, of 15 to 23 to 1.2e-4: what is left is the rule for panels that
+    touch.
     """
     faces = faces_of(rectangle(1.0, 1.0))
     for distance, bound in ((0.02, 1.5e-2), (20.0, 2e-4)):
