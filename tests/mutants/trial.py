@@ -171,6 +171,9 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
     except BaseException as error:  # whatever a fault does
         print(f"{type(error).__name__}: {error}", flush=True)
     finally:
+        with contextlib.suppress(Exception):  # a fault may have closed them
+            sys.stdout.flush()
+            sys.stderr.flush()
         os._exit(code)
 
 
