@@ -88,7 +88,7 @@ class Simulation:
         self._block_frames = block_frames(len(scene.pairs))
         self._motion = plan(scene.linkage, scene.script)
         self._proven = scene.model.collision.between == "proven"
-        self.collision = _collision(scene, self._motion if self._proven else None)
+        self.collision = collision_pipeline(scene, self._motion if self._proven else None) if scene.pairs else None
         self.suites: dict[str, Suite] = {
             kind: KINDS[kind].suite(sensors, scene.targets, getattr(scene.model, kind), savings=scene.savings)
             for kind, sensors in scene.sensors.items()
@@ -158,10 +158,11 @@ def touching(scene: Scene, positions: Floats, free_poses: Floats) -> Iterator[Fl
     """
     from replay.collision.columns import Level
 
-    collision = _collision(scene, None)
-    for first in range(0, len(positions) if collision else 0, BLOCK_FRAMES):
+    if not scene.pairs:
+        return
+    collision = collision_pipeline(scene, None)
+    for first in range(0, len(positions), BLOCK_FRAMES):
         chosen = slice(first, first + BLOCK_FRAMES)
-        assert collision is not None
         yield collision.run(scene.linkage.forward(positions[chosen], free_poses[chosen])).level == Level.CONTACT
 
 
@@ -174,9 +175,8 @@ def touching_first(scene: Scene) -> tuple[str, ...]:
     return tuple(name for flags in found for name, met in zip(scene.layout.pairs, flags[0], strict=True) if met)
 
 
-def _collision(scene: Scene, motion: Motion | None) -> CollisionPipeline | None:
-    if not scene.pairs:
-        return None
+def collision_pipeline(scene: Scene, motion: Motion | None) -> CollisionPipeline:
+    """Return what computes the pairs of a scene that tests any; without its motion, at the frames alone."""
     from replay.collision.pipeline import CollisionPipeline
 
     version = scene.model.collision

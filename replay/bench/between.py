@@ -28,8 +28,8 @@ from replay.numerics import transforms
 from replay.numerics.arrays import Integers
 from replay.numerics.constants import SECOND
 from replay.scenario.model import Scenario
-from replay.scenario.scene import Scene, build
-from replay.simulation import BLOCK_FRAMES
+from replay.scenario.scene import build
+from replay.simulation import BLOCK_FRAMES, collision_pipeline
 
 SCENES, TIMES, PEERS = "shipped scenes", "times of contacts", "python-fcl, continuous collision of boxes through plates"
 
@@ -81,7 +81,7 @@ def _scene(
     """Return a line on a scene, its pair-intervals, those of them that are proven or found, and how much faster."""
     scene = build(scenario.model_copy(update={"rate": rate}))
     motion = plan(scene.linkage, scene.script)
-    engines = {True: _pipeline(scene, motion), False: _pipeline(scene, None)}
+    engines = {True: collision_pipeline(scene, motion), False: collision_pipeline(scene, None)}
     seconds = dict.fromkeys(engines, math.inf)
     for _ in range(rounds):
         spent, found = dict.fromkeys(engines, 0.0), []
@@ -120,20 +120,6 @@ def _scene(
         "faster": f"{ratio:.3g} x",
     }
     return line, asked, asked - unknown, ratio
-
-
-def _pipeline(scene: Scene, motion: Motion | None) -> CollisionPipeline:
-    version = scene.model.collision
-    return CollisionPipeline(
-        scene.bodies,
-        scene.pairs,
-        scene.linkage,
-        bounds=version.bounds,
-        pieces=version.pieces,
-        clearance=version.clearance,
-        margin=scene.margin,
-        motion=motion,
-    )
 
 
 def _poses(linkage: Linkage, motion: Motion, ns: Integers) -> LinkPoses:

@@ -78,7 +78,7 @@ PROVEN, FOUND, UNPROVEN = range(3)
 
 
 class Questions(NamedTuple):
-    """k intervals of pairs to search; rows as `ask` writes them."""
+    """k intervals of pairs to search; what `Intervals` is in doubt of."""
 
     bodies: Integers  # (k, 2) bodies a and b
     chain: Integers  # (k, 2) ways of `Chains`: over the common ancestor, and for boxes along the world's axes over it
@@ -385,95 +385,43 @@ def search(
         measure_travel(line, n, t0 / 1e9, t1 / 1e9, s)
         rounding = measure_arms(line, chains, volumes, way, a, b, n, s)
         limit = cap + least_way(n, s)[0]
-        first, last, apart = -1, -1, -1  # the bodies meet first, meet last, and are apart again, where that was found
-        before, after = q.level[k, 0] == 2, q.level[k, 1] == 2
         r.seed[0, 0], r.seed[0, 1] = -1, -1
-        if q.doubt[k] & CONTACT_DOUBT:
-            d0, d1 = 0.0, 0.0
-            if not before:
-                d0 = look(bodies, volumes, line, chains, q, k, BODIES, t0, limit, s, wide, r)[1]
-            if not after:
-                d1 = look(bodies, volumes, line, chains, q, k, BODIES, t1, limit, s, wide, r)[1]
+        first, last, apart = -1, -1, -1  # the bodies meet first, meet last, and are apart again, where that was found
+        for what in range(2):
+            level = 2 - what
+            before, after = q.level[k, 0] >= level, q.level[k, 1] >= level
+            doubted = q.doubt[k] & (CONTACT_DOUBT if what == BODIES else BOUNDS_DOUBT) != 0
+            if (before and after) or not (doubted or first >= 0):
+                continue
+            if what == VOLUMES and volumes.kind == AABB:
+                way = q.chain[k, 1]
+                place(line, chains, way, t0 / 1e9, wide)
+                n = list_steps(line, chains, way, wide)
+                measure_travel(line, n, t0 / 1e9, t1 / 1e9, wide)
+                rounding = measure_arms(line, chains, volumes, way, a, b, n, wide)
+            d0 = 0.0 if before else look(bodies, volumes, line, chains, q, k, what, t0, limit, s, wide, r)[1]
+            d1 = 0.0 if after else look(bodies, volumes, line, chains, q, k, what, t1, limit, s, wide, r)[1]
+            met = t0 if before else first  # where bodies meet so do their volumes
             if not before:
                 r.time[0], r.distance[0], r.meets[0] = t1, d1, 1 if after else 0
+                if met >= 0:
+                    r.time[0], r.distance[0], r.meets[0] = met, 0.0, 1
                 outcome, proven = sweep(
-                    bodies, volumes, line, chains, q, k, BODIES, t0, d0, 1, limit, resolution, n, rounding, s, wide, r
+                    bodies, volumes, line, chains, q, k, what, t0, d0, 1, limit, resolution, n, rounding, s, wide, r
                 )
                 if outcome == FOUND:
-                    written = _write(events, written, k, 2, 1, r.bracket[0], r.bracket[1])
-                    first = r.bracket[1]
-                if not after:
-                    between[k] = outcome
-                    bound[k] = min(proven, cap) if outcome == PROVEN else 0.0
-            if not after and (before or first >= 0):
-                r.time[0], r.distance[0], r.meets[0] = t0 if before else first, 0.0, 1
-                sweep(
-                    bodies, volumes, line, chains, q, k, BODIES, t1, d1, 1, limit, resolution, n, rounding, s, wide, r
-                )
-                written = _write(events, written, k, 2, 0, r.bracket[1], r.bracket[0])
-                last, apart = r.bracket[1], r.bracket[0]
-        before, after = q.level[k, 0] >= 1, q.level[k, 1] >= 1
-        if (before and after) or not (q.doubt[k] & BOUNDS_DOUBT or first >= 0):
-            continue
-        if volumes.kind == AABB:
-            way = q.chain[k, 1]
-            place(line, chains, way, t0 / 1e9, wide)
-            n = list_steps(line, chains, way, wide)
-            measure_travel(line, n, t0 / 1e9, t1 / 1e9, wide)
-            rounding = measure_arms(line, chains, volumes, way, a, b, n, wide)
-        if not before:
-            distance = look(bodies, volumes, line, chains, q, k, VOLUMES, t0, limit, s, wide, r)[1]
-            r.time[0], r.distance[0], r.meets[0] = t1, 0.0, 1 if after else 0
-            if first >= 0:
-                r.time[0], r.meets[0] = first, 1
-            elif not after:
-                r.distance[0] = look(bodies, volumes, line, chains, q, k, VOLUMES, t1, limit, s, wide, r)[1]
-            outcome, _ = sweep(
-                bodies,
-                volumes,
-                line,
-                chains,
-                q,
-                k,
-                VOLUMES,
-                t0,
-                distance,
-                1,
-                limit,
-                resolution,
-                n,
-                rounding,
-                s,
-                wide,
-                r,
-            )
-            if outcome != FOUND:
-                continue
-            written = _write(events, written, k, 1, 1, r.bracket[0], r.bracket[1])
-            last = max(last, r.bracket[1])
-        if not after:
-            distance = look(bodies, volumes, line, chains, q, k, VOLUMES, t1, limit, s, wide, r)[1]
-            r.time[0], r.distance[0], r.meets[0] = max(last, t0), 0.0, 1
-            sweep(
-                bodies,
-                volumes,
-                line,
-                chains,
-                q,
-                k,
-                VOLUMES,
-                t1,
-                distance,
-                1,
-                limit,
-                resolution,
-                n,
-                rounding,
-                s,
-                wide,
-                r,
-            )
-            written = _write(events, written, k, 1, 0, r.bracket[1], max(r.bracket[0], apart))
+                    met = r.bracket[1]
+                    written = _write(events, written, k, level, 1, r.bracket[0], met)
+                if what == BODIES:
+                    first = met
+                    if not after:
+                        between[k] = outcome
+                        bound[k] = min(proven, cap) if outcome == PROVEN else 0.0
+            if not after and met >= 0:
+                r.time[0], r.distance[0], r.meets[0] = max(met, last), 0.0, 1
+                sweep(bodies, volumes, line, chains, q, k, what, t1, d1, 1, limit, resolution, n, rounding, s, wide, r)
+                last, apart = r.bracket[1], max(r.bracket[0], apart)
+                written = _write(events, written, k, level, 0, last, apart)
     return written
 
 

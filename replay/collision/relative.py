@@ -10,6 +10,7 @@ import numpy as np
 from numba import boolean, float64, int64
 
 from replay.kinematics.linkage import Linkage
+from replay.kinematics.timeline import compose
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
@@ -113,7 +114,7 @@ def _relative(
     for k in range(len(ways)):
         parent, link = ways[k, 0], ways[k, 1]
         for f in range(n if needed[k] else 0):
-            _compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
+            compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
     for q in range(len(pairs)):
         a, b = pairs[q, 0], pairs[q, 1]
         for f in range(n if wanted[q] else 0):
@@ -122,16 +123,4 @@ def _relative(
                 for j in range(3):
                     inverse[i, j] = up[j, i]
                 inverse[i, 3] = -(up[0, i] * up[0, 3] + up[1, i] * up[1, 3] + up[2, i] * up[2, 3])
-            _compose(inverse, identity if b < 0 else table[b, f], result[q, f])
-
-
-@leaf_kernel
-def _compose(first: Floats, second: Floats, product: Floats) -> None:
-    """Write first second, rigid transforms (4, 4), in the order of operations of `transforms.compose`."""
-    for i in range(3):
-        x, y, z = first[i, 0], first[i, 1], first[i, 2]
-        for j in range(3):
-            product[i, j] = x * second[0, j] + y * second[1, j] + z * second[2, j]
-        product[i, 3] = x * second[0, 3] + y * second[1, 3] + z * second[2, 3] + first[i, 3]
-        product[3, i] = 0.0
-    product[3, 3] = 1.0
+            compose(inverse, identity if b < 0 else table[b, f], result[q, f])
