@@ -3,6 +3,7 @@
 import itertools
 from functools import partial
 
+import ipctk
 import numpy as np
 import pytest
 
@@ -11,8 +12,6 @@ from replay.collision.pairs import CollisionBody, plan_pairs
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry.mesh import solid_from_triangles
 from tests.kinematics.scripts import random_motion
-
-ipctk = pytest.importorskip("ipctk")
 
 FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 EDGES = tuple(itertools.combinations(range(4), 2))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from replay.errors import InvalidValue
 from replay.sensing.electrostatics import bem
 from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.placement import PosedBodies
@@ -24,6 +25,7 @@ def check_case(name: str) -> None:
     diagonal = np.diag(truth)
     counts = diagonal > 0.02 * diagonal.max()
     assert (np.abs(np.diag(value) - diagonal) <= 6e-3 * diagonal + np.diag(doubt))[counts].all()
+    # the estimate is too small for bare2, which is off by 2.7 of it beyond what is doubted of the truth
     assert (np.abs(value - truth) <= 3.0 * error + doubt)[np.diag_indices(len(truth))][counts].all()
     main = np.max(diagonal[1:]) if len(diagonal) > 1 else diagonal[0]
     large = np.abs(truth) > 0.1 * main
@@ -121,5 +123,5 @@ def test_a_shape_that_is_there_twice_counts_once() -> None:
 
 def test_more_unknowns_than_fit_are_refused_with_their_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bem, "MOST_UNKNOWNS", 50)
-    with pytest.raises(Exception, match=r"unknowns of method bem = \d+: must be at most 50"):
+    with pytest.raises(InvalidValue, match=r"unknowns of method bem = \d+: must be at most 50"):
         bem.read(two_plates(), placed(ConductorBody("ball", (shifted(icosphere(0.03, 2), 0.0, 0.0, 0.06),))))
