@@ -13,7 +13,8 @@ from collections import Counter
 from pathlib import Path
 
 from tests.fuzz import guard
-from tests.fuzz.doors import House, knock
+from tests.fuzz.door import knock
+from tests.fuzz.doors import House
 
 CORPUS = Path(__file__).parent / "corpus"
 
