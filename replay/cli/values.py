@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,10 @@ _TIME_UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class PathName(click.Path):
-    """A path; an empty one, as a variable of the shell that is not set makes it, is refused."""
+    """A path; an empty one, as a variable of the shell that is not set makes it, is refused.
+
+    So is one that no file can have, whose name is too long or leads through links that go in a circle.
+    """
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
@@ -22,6 +26,11 @@ class PathName(click.Path):
         """Return the path."""
         if str(value) == "":
             self.fail("the path is empty")
+        try:
+            Path(value).stat()
+        except OSError as error:
+            if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+                self.fail(f"{str(value)[:200]!r} names nothing: {error.strerror}")
         return super().convert(value, param, ctx)
 
 
