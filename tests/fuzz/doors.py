@@ -32,6 +32,7 @@ from replay.scenario.load import load_cases, load_model, load_sources
 from tests.fuzz import damage
 from tests.fuzz.door import Door, command
 from tests.fuzz.robot_doors import robot_doors
+from tests.fuzz.run_doors import RunDoors
 from tests.logs import made_logs
 from tests.recording.test_round_trip import write
 
@@ -177,6 +178,7 @@ class House:
                 self._accept,
             ),
             **robot_doors(),
+            **RunDoors(self.folder, SCENARIO).doors(),
         }
 
     def _text(self, name: str, whole: bytes) -> Callable[[random.Random], dict[str, bytes]]:
