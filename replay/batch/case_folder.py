@@ -48,6 +48,15 @@ def finish(result: CaseResult, folder: Path) -> CaseResult:
     return result
 
 
+def said(folder: Path) -> list[str]:
+    """Return the lines of a scenario's log; none where it cannot be read."""
+    log = folder / LOG
+    with contextlib.suppress(OSError):
+        if log.is_file():
+            return log.read_text(encoding="utf-8", errors="replace").splitlines()
+    return []
+
+
 def unwritable(result: CaseResult, error: WriteError) -> CaseResult:
     """Return the result of a scenario whose folder cannot be written."""
     failed = CaseResult(result.name, CaseStatus.FAILED, error=result.error or str(error), invalid=result.invalid)

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 import replay
-from replay.batch.case_folder import LOG
+from replay.batch.case_folder import LOG, said
 from replay.batch.judged import OVERLAY, Judged, Regression, RegressVerdict
 from replay.comparison import report_html
 from replay.errors import count
@@ -83,19 +83,24 @@ def command(found: Regression, item: Judged) -> str:
 def _log(found: Regression, item: Judged) -> str:
     if item.result is None or item.result.status.recorded:
         return ""
-    log = found.run.directory / item.name / LOG
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.is_file() else []
-    return "\n".join(lines[-_LINES:])
+    return "\n".join(said(found.run.directory / item.name)[-_LINES:])
 
 
 def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
     folder = found.run.directory / item.name
     names = [name.format(name=item.name) for name in _FILES]
     home = quote(os.fsencode(item.name))
-    links = [(name, f"{home}/{quote(os.fsencode(name))}") for name in names if (folder / name).is_file()]
+    links = [(name, f"{home}/{quote(os.fsencode(name))}") for name in names if _is_there(folder / name)]
     if item.comparison is not None:
         links.append(("baseline", _address(Path(item.comparison.baseline).resolve(), found.run.directory.resolve())))
     return tuple(links)
+
+
+def _is_there(file: Path) -> bool:
+    try:
+        return file.is_file()
+    except OSError:
+        return False
 
 
 def _address(file: Path, folder: Path) -> str:

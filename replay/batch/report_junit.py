@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
-from pathlib import Path
 from xml.etree import ElementTree
 
 import replay
+from replay.batch.case_folder import said
 from replay.batch.judged import Judged, Regression, RegressVerdict
 from replay.comparison.report_junit import clean
 from replay.comparison.report_text import text
@@ -79,5 +79,4 @@ def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
 def _details(found: Regression, item: Judged) -> str:
     if item.comparison is not None and item.verdict is RegressVerdict.DIFFERENT:
         return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
-    log = Path(found.run.directory) / item.name / "log.txt"
-    return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])
+    return "\n".join([item.message, *said(found.run.directory / item.name)[-50:]])

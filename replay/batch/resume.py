@@ -34,10 +34,13 @@ def earlier_result(
     """
     paths = RecordedPaths(folder / f"{scenario.name}.mcap", folder / f"{scenario.name}.rrd" if rrd else None)
     for path in (paths.mcap, paths.rrd, folder / RESULT):
-        if path is not None and not path.is_file():
-            return f"there is no {path.name}"
-        if path is not None and (path.is_symlink() or folder.is_symlink()):
-            return f"{path.name} is a link, or in a folder that is one"
+        try:
+            if path is not None and not path.is_file():
+                return f"there is no {path.name}"
+            if path is not None and (path.is_symlink() or folder.is_symlink()):
+                return f"{path.name} is a link, or in a folder that is one"
+        except OSError as error:
+            return f"{path.name} cannot be looked for: {error.strerror}"
     try:
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)

@@ -16,7 +16,8 @@ _TIME_UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 class PathName(click.Path):
     """A path; an empty one, as a variable of the shell that is not set makes it, is refused.
 
-    So is one that no file can have, whose name is too long or leads through links that go in a circle.
+    So is one that cannot be asked for: its name is too long, it leads through links that go in a circle, or through a
+    folder that may not be looked into.
     """
 
     def __init__(self) -> None:
@@ -29,8 +30,8 @@ class PathName(click.Path):
         try:
             Path(value).stat()
         except OSError as error:
-            if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
-                self.fail(f"{str(value)[:200]!r} names nothing: {error.strerror}")
+            if error.errno not in (errno.ENOENT, errno.ENOTDIR):
+                self.fail(f"{str(value)[:200]!r} leads nowhere: {error.strerror}")
         return super().convert(value, param, ctx)
 
 
