@@ -15,6 +15,8 @@ from replay.logs.part_file import UNFINISHED, append_lines, refuse_link, write_f
 KINDS = (".mcap", ".rrd")
 LOG = "log.txt"
 """Name of the file that holds what a scenario said."""
+_LAST = 1 << 16
+"""Bytes of it that are shown at most."""
 
 
 def begin(folder: Path) -> None:
@@ -49,11 +51,13 @@ def finish(result: CaseResult, folder: Path) -> CaseResult:
 
 
 def said(folder: Path) -> list[str]:
-    """Return the lines of a scenario's log; none where it cannot be read."""
+    """Return the last lines of a scenario's log; none where it cannot be read."""
     log = folder / LOG
     with contextlib.suppress(OSError):
         if log.is_file():
-            return log.read_text(encoding="utf-8", errors="replace").splitlines()
+            with log.open("rb") as stream:
+                stream.seek(max(log.stat().st_size - _LAST, 0))
+                return stream.read(_LAST).decode(errors="replace").splitlines()
     return []
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,10 +24,16 @@ class Night:
 
 
 def read_history(path: Path) -> list[Night]:
-    """Return all nights in the order of the file; lines that cannot be read, as a crash leaves them, are left out."""
+    """Return all nights in the order of the file; lines that cannot be read, as a crash leaves them, are left out.
+
+    A pipe or a device has none: what is appended to it is gone.
+    """
     nights = []
     try:
-        if path.stat().st_size > limits.HISTORY:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+            return []
+        if found.st_size > limits.HISTORY:
             raise WriteError(str(path), f"it has more than {limits.HISTORY} bytes: begin a new one")
         lines = path.read_text(encoding="utf-8").splitlines()
     except (FileNotFoundError, NotADirectoryError):

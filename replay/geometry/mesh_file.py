@@ -43,6 +43,9 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         raise MeshError(name, f"the file ending {Path(path).suffix!r} is not one of {', '.join(FORMATS)}")
     if data is None:
         try:
+            size = Path(path).stat().st_size
+            if size > limits.FILE:
+                raise MeshError(name, f"has {size} bytes; at most {limits.FILE} are read")
             data = Path(path).read_bytes()
         except OSError as error:
             raise MeshError(name, error.strerror or "cannot be read") from error

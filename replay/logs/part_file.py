@@ -192,7 +192,8 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: 
 def append_lines(path: Path, lines: Iterable[str], *, named: bool = False) -> None:
     """Append lines to a text file and make the folders that it needs; all of them or, with a WriteError, none.
 
-    A file that has other names (hard links) loses them first. A link is refused, unless the user `named` it.
+    A file that has other names (hard links) loses them first. A link, a pipe or a device is refused, unless the user
+    `named` it.
     """
     if not named:
         refuse_link(path)
@@ -200,6 +201,8 @@ def append_lines(path: Path, lines: Iterable[str], *, named: bool = False) -> No
     try:
         if not named and path.is_file() and path.stat().st_nlink > 1:
             write_file(path, path.read_bytes())
+        elif not named and path.exists() and not path.is_file() and not path.is_dir():
+            raise WriteError(str(path), "it is a pipe or a device, and results are kept in files; remove it")
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("ab", buffering=0) as stream:
             lock(stream.fileno(), wait=True)  # several machines may append to one history
