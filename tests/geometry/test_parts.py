@@ -41,7 +41,9 @@ def test_at_an_edge_of_many_those_are_neighbours_that_bound_the_thinnest_wedge(d
         order = [*order]
         points, faces = fan(np.array(degrees)[order], np.array(forward)[order], way)
         found = find_parts(points, faces)
-        parts = {frozenset(order[k] for k in np.flatnonzero(found.label == part)) for part in range(found.label.max() + 1)}
+        parts = {
+            frozenset(order[k] for k in np.flatnonzero(found.label == part)) for part in range(found.label.max() + 1)
+        }
         assert parts == set(map(frozenset, pairs))
         assert not found.turned.any() and not found.one_sided.any() and not found.closed.any()
 
