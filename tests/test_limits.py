@@ -123,6 +123,15 @@ def branching(levels: int, *, recursive: bool) -> bytes:
     return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
 
 
+def test_a_message_type_has_as_many_fields_as_are_read_and_not_one_more(monkeypatch) -> None:
+    descriptor = message_type("a", "T0", branching(3, recursive=False)).DESCRIPTOR  # 2 fields, 2 x 2, and none in these
+    monkeypatch.setattr(limits, "SCHEMA_FIELDS", 6)
+    assert len(list(fields_of("a", descriptor))) == 6
+    monkeypatch.setattr(limits, "SCHEMA_FIELDS", 5)
+    with pytest.raises(LimitError, match="more than 5 fields"):
+        list(fields_of("a", descriptor))
+
+
 def test_fields_within_fields_are_counted() -> None:
     inside = message_type("a", "T0", branching(1, recursive=True)).DESCRIPTOR
     assert [path for path, _ in fields_of("a", inside)] == ["f1", "f2"]

@@ -50,7 +50,7 @@ def test_the_apex_lies_beside_the_middle_of_the_boundary():
     added = caps(CUBE[2:])
     assert (added[:, 0] == added[0, 0]).all()
     rim = np.unique(added[:, 1:].reshape(-1, 3), axis=0)
-    np.testing.assert_allclose(added[0, 0], rim.mean(axis=0) + (0.0711, 0.1093, 0.0837), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(added[0, 0], rim.mean(axis=0) + np.array([0.0711, 0.1093, 0.0837]), rtol=0, atol=1e-15)
 
 
 def sky(point, x, y):

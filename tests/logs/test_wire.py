@@ -194,3 +194,32 @@ def test_a_list_of_varints_of_different_widths_is_no_column(values) -> None:
 )
 def test_a_list_that_is_not_as_it_should_be_is_no_column(data) -> None:
     assert shape_of(message_of_lists().DESCRIPTOR, data) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x0d\0\0\0\0",  # a uint32 as four bytes
+        b"\x09" + bytes(8),  # as eight
+        b"\x20\x01",  # a fixed32 as a varint
+        b"\x21" + bytes(8),  # as eight bytes
+        b"\x25\0\0\0",  # cut short
+        b"\x2d\0\0\0\0",  # a double as four bytes
+        b"\x0b",  # a group
+    ],
+)
+def test_a_value_of_another_wire_type_than_its_field_has_is_no_slot(data) -> None:
+    assert shape_of(message_of_lists().DESCRIPTOR, data) is None
+
+
+@pytest.mark.parametrize(("name", "value"), [("uint32", 5), ("fixed32", 7), ("double", -0.5), ("sint64", -3)])
+def test_a_list_of_one_that_is_not_packed_is_a_slot(name, value) -> None:
+    number = [*LIST_KINDS].index(name) + 1
+    lists = message_of_lists()
+    packed = lists(**{name: [value]}).SerializeToString()[2:]
+    wire = {"fixed32": 5, "double": 1}.get(name, 0)
+    data = bytes([number << 3 | wire]) + packed
+    assert lists.FromString(data) == lists(**{name: [value]})
+    shape = shape_of(lists.DESCRIPTOR, data)
+    assert shape is not None and [*shape.slots] == [f"{name}[0]"]
+    assert shape.slots[f"{name}[0]"].read(np.frombuffer(data, dtype=np.uint8)[None]).tolist() == [value]
