@@ -20,7 +20,7 @@ class Targets:
         modules = {_module(path.relative_to(root)): str(path.relative_to(root)) for path in files}
         self._imported_by: dict[str, set[str]] = {}
         for path in files:
-            for name in _imports(path, _module(path.relative_to(root)).rpartition(".")[0]):
+            for name in _imports(path, ".".join(path.relative_to(root).parent.parts)):
                 if name in modules:
                     self._imported_by.setdefault(modules[name], set()).add(str(path.relative_to(root)))
 

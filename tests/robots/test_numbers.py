@@ -62,5 +62,5 @@ def test_so_many_numbers_are_told(text):
 
 def test_a_size_is_not_negative():
     assert size(element(radius="0"), "radius") == 0.0 and size(element(radius="0.5"), "radius") == 0.5
-    with pytest.raises(RobotError, match="radius=-0.1, which is below 0"):
+    with pytest.raises(RobotError, match=r"radius=-0\.1, which is below 0"):
         size(element(radius="-0.1"), "radius")
