@@ -40,6 +40,7 @@ print(len(ready), sorted(str(each) for each in called - ready))
 """
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("savings", [True, False])
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_kernels_are_all_compiled_before_the_first_scenario(model, savings):
