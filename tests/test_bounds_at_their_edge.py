@@ -36,6 +36,7 @@ LOG = made_logs.mcap(SAID)
 TIME = Format(None, None, {"s": Fraction(10**9)})
 CSV = b"time,a\n1,2\n3,4\n"
 CUBE = b"".join(b"v %d %d %d\n" % (k & 1, k >> 1 & 1, k >> 2) for k in range(8)) + b"f 1 3 4 2\nf 5 6 8 7\n"
+THREE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 FOLDED = b"v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.5 0\nv 0 2 0\nf 1 2 3 4 5\nf 1 2 3 4 5\n"
 TEXT_PLY = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 TEXT_PLY += b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
