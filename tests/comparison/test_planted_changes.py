@@ -51,6 +51,9 @@ def test_one_bit_of_one_double_of_one_frame(place, name, bit):
     assert signal.signal.full_name == name
     assert (signal.frames, signal.outside, signal.first.frame) == (1, 1, 35)
     assert signal.first.time == BASELINE.time[35] / 1e9
+    assert (signal.nan, signal.infinite, signal.echo) == (0, 0, 0)
+    assert (signal.events, signal.event_count, signal.lone_events) == ((), 0, 0)  # a number has none
+    assert (signal.max_shift, signal.max_shift_frames) == (0.0, 0)
     assert signal.worst_abs is not None and signal.worst_abs.at == signal.first
     if "rotation" not in name:
         assert (signal.worst_abs.baseline, signal.worst_abs.candidate) == (before, after)
