@@ -98,9 +98,12 @@ def _table(flat: Floats, begin: int, end: int, margin: float) -> tuple[Integers,
     while side < 8 or (3 * side * side < end - begin and side < 64):
         side = max(1, 2 * side)
         finer = np.empty(8 * side * side + 1, dtype=np.int64)
-        found = np.empty(_list_cells(flat, side, margin, starts, listed, finer, listed[:0]), dtype=np.int64)
-        _list_cells(flat, side, margin, starts, listed, finer, found)
-        starts, listed = finer, found
+        found = np.empty(2 * len(listed) + 64 * side * side, dtype=np.int64)  # more are listed where many are alike
+        count = _list_cells(flat, side, margin, starts, listed, finer, found)
+        if count > len(found):
+            found = np.empty(count, dtype=np.int64)
+            _list_cells(flat, side, margin, starts, listed, finer, found)
+        starts, listed = finer, found[:count]
     return starts, listed
 
 
