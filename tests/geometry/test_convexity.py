@@ -67,7 +67,7 @@ SURFACES = {
     "nested": np.concatenate([ROUND, 0.5 * ROUND]),
     "cavity": np.concatenate([ROUND, 0.5 * ROUND[:, ::-1]]),
     "twice, nearly": np.concatenate([ROUND, (1.0 + 1e-8) * ROUND]),
-    "overlapping": np.concatenate([ROUND, ROUND + [0.2, 0.0, 0.0]]),
+    "overlapping": np.concatenate([ROUND, ROUND + np.array([0.2, 0.0, 0.0])]),
     "inside out": ROUND[:, ::-1],
     "wound twice": wound_twice(0.2),
     "wound twice, nearly alike": wound_twice(1e-8),
