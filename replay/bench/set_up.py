@@ -13,6 +13,7 @@ from replay.bench.measure import Row, exponent
 from replay.bench.report import LogLogPlot, Report
 from replay.geometry.primitives import cylinder, sphere
 from replay.numerics.arrays import Floats
+from replay.numerics.kept import forget
 from replay.scenario.load import load_sources
 from replay.scenario.scene import build
 from replay.simulation import Simulation
@@ -46,6 +47,7 @@ def growth(report: Report, *, sizes: Sequence[int] = TRIANGLES, rounds: int) -> 
 
 def _seconds(triangles: Floats) -> float:
     scenario = load_sources("mesh.yaml", {"mesh.yaml": _SCENARIO, "body.stl": stl(triangles)})
+    forget()
     begin = time.perf_counter()
     Simulation(build(scenario))
     return time.perf_counter() - begin

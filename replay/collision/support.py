@@ -18,6 +18,7 @@ from numba import float64, int64
 
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, inlined_kernel, kernel, record
+from replay.numerics.kept import kept
 
 FEW = 16
 """Sets of so many vertices or fewer are looked at vertex by vertex: as fast as finding the cell."""
@@ -73,10 +74,10 @@ def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets
     for k in np.flatnonzero(counts > FEW) if tables else ():
         begin, end = first[k], first[k + 1]
         margin[k] = MARGIN * float(np.abs(vertices[begin:end]).max())
-        starts, listed = _table(flat, begin, end, margin[k])
+        starts, listed = _table(flat[3 * begin : 3 * end], float(margin[k]))
         side[k], table[k] = round(np.sqrt(len(starts) // 8)), cell_count
         cells.append(starts + candidate_count)
-        candidates.append(listed)
+        candidates.append(listed + begin)
         cell_count, candidate_count = cell_count + len(starts), candidate_count + len(listed)
     none = [np.zeros(0, dtype=np.int64)]
     return Sets(
@@ -92,10 +93,12 @@ def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets
     )
 
 
-def _table(flat: Floats, begin: int, end: int, margin: float) -> tuple[Integers, Integers]:
-    """Return the starts (8 N N + 1,) of each cell's list and the lists, of vertex rows begin:end."""
-    side, starts, listed = 0, np.array([0, end - begin], dtype=np.int64), np.arange(begin, end, dtype=np.int64)
-    while side < 8 or (3 * side * side < end - begin and side < 64):
+@kept
+def _table(flat: Floats, margin: float) -> tuple[Integers, Integers]:
+    """Return the starts (8 N N + 1,) of each cell's list and the lists, of the rows of v vertices (3 v,)."""
+    vertices = len(flat) // 3
+    side, starts, listed = 0, np.array([0, vertices], dtype=np.int64), np.arange(vertices, dtype=np.int64)
+    while side < 8 or (3 * side * side < vertices and side < 64):
         side = max(1, 2 * side)
         finer = np.empty(8 * side * side + 1, dtype=np.int64)
         found = np.empty(2 * len(listed) + 64 * side * side, dtype=np.int64)  # more are listed where many are alike

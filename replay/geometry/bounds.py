@@ -19,6 +19,7 @@ from replay.numerics.arguments import as_floats
 from replay.numerics.arrays import Floats
 from replay.numerics.constants import EPSILON
 from replay.numerics.extents import extents
+from replay.numerics.kept import kept
 from replay.numerics.rows import distinct_rows
 
 __all__ = [
@@ -104,6 +105,7 @@ def fit_aabb(points: Floats) -> Aabb:
     return Aabb(center, half_widths * (1.0 + _ULPS * EPSILON))
 
 
+@kept
 def principal_obb(
     points: Floats,
     *,

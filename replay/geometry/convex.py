@@ -13,6 +13,7 @@ from replay.geometry.hull import extreme_points
 from replay.geometry.solid import Solid
 from replay.geometry.tree import Tree, boxes_of, build_tree
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.kept import kept
 from replay.numerics.rows import distinct_rows
 
 
@@ -31,6 +32,7 @@ class ConvexSets(NamedTuple):
     closing: Floats  # (c, 3, 3) [m]
 
 
+@kept
 def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "exact") -> ConvexSets:
     """Return the convex sets that stand for a solid in collisions.
 

@@ -23,6 +23,7 @@ from replay.geometry.winding import Topology, corner_indices, sides, topology
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
+from replay.numerics.kept import kept
 
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
 
@@ -44,9 +45,13 @@ def load_mesh(path: Path | str, *, scale: float | Sequence[float], data: bytes |
         MeshError: unreadable or of another format, empty, not finite, without any triangle that has an area.
         InvalidValue: a scale that is not finite and positive, or along an axis not finite or 0.
     """
-    scales = _along_axes(scale)
-    name = str(path)
-    vertices, faces = read_faces(path, data)
+    read = _load if data is None else kept(_load)  # a file may change meanwhile
+    return read(str(path), _along_axes(scale), data)
+
+
+def _load(name: str, scales: Floats, data: bytes | None) -> Solid:
+    """Return the body in a mesh file, its coordinates multiplied by scales (3,); see `load_mesh`."""
+    vertices, faces = read_faces(name, data)
     if len(faces) == 0:
         raise MeshError(name, "holds no triangles")
     wrong = faces[(faces < 0) | (faces >= len(vertices))]
@@ -59,6 +64,7 @@ def load_mesh(path: Path | str, *, scale: float | Sequence[float], data: bytes |
     if np.prod(np.sign(scales)) < 0.0:
         triangles = triangles[:, [0, 2, 1]]
     if np.max(np.abs(triangles)) > _LARGEST:
+        scale = float(scales[0]) if (scales == scales[0]).all() else scales.tolist()
         raise MeshError(name, f"coordinates times scale = {scale} reach beyond {_LARGEST} m")
     try:
         return solid_from_triangles(triangles)

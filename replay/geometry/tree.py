@@ -17,6 +17,7 @@ from numba import float64, int64
 from replay.errors import InvalidValue
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, record
+from replay.numerics.kept import kept
 
 _BINS = 16
 _FREE_LEVELS = 32
@@ -80,6 +81,7 @@ def build_tree(lower: Floats, upper: Floats, *, leaf_size: int = 4) -> Tree:
     )
 
 
+@kept
 def triangle_tree(triangles: Floats, *, leaf_size: int = 4) -> Tree:
     """Return the tree over triangles (n, 3, 3) [m]; see `build_tree`."""
     triangles = np.asarray(triangles, dtype=np.float64)
