@@ -40,15 +40,20 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
     from replay.bench import results
     from replay.cli.bench_progress import BenchProgress
 
-    names = names or BENCHMARKS
+    names, before = names or BENCHMARKS, results.earlier_seconds(output)
     reports, paths = [], []
-    with tempfile.TemporaryFile() as said, diverted_stderr(said) as shown, BenchProgress(names, shown) as progress:
+    with (
+        tempfile.TemporaryFile() as said,
+        diverted_stderr(said) as shown,
+        BenchProgress(names, before, shown) as progress,
+    ):
         for name in names:
             begin = time.perf_counter()
             reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
             reports[-1].said = lines_of(said)
+            reports[-1].seconds = time.perf_counter() - begin
             paths = results.write(reports, output)  # after each, so that an interruption loses none
-            progress.done(time.perf_counter() - begin)
+            progress.done(reports[-1].seconds)
     note(f"wrote {', '.join(map(str, paths))}")
     say(form, lambda: results.as_text(reports).splitlines(), lambda: results.as_json(reports))
     missed = any(goal.failed for report in reports for goal in report.goals)

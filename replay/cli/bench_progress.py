@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TextIO
 
 from rich.console import Console
@@ -14,32 +14,21 @@ from replay.bench import measure
 from replay.errors import printable
 from replay.numerics.jit import progress as compiling
 
-SECONDS = {
-    "collision": 60.0,
-    "between": 60.0,
-    "distance": 60.0,
-    "capacitive": 60.0,
-    "pipeline": 60.0,
-    "savings": 60.0,
-    "scaling": 60.0,
-    "stability": 60.0,
-    "recording": 60.0,
-    "diff": 60.0,
-    "start": 60.0,
-}
-"""What benchmarks take on one machine [s]; only their ratios matter."""
-
 
 class BenchProgress:
     """Says which benchmark runs, on what, and how long all will take; use as a context.
 
     Args:
         names: of the benchmarks, in the order in which they run.
+        seconds: what they took in an earlier run, as far as that is known: only the ratios matter, and all are taken to
+            be alike where one is missing.
         stream: where it is said.
     """
 
-    def __init__(self, names: Sequence[str], stream: TextIO) -> None:
+    def __init__(self, names: Sequence[str], seconds: Mapping[str, float], stream: TextIO) -> None:
         self._names = names
+        known = all(seconds.get(name, 0.0) > 0.0 for name in names)
+        self._shares = [seconds[name] if known else 1.0 for name in names]
         console = Console(file=stream, highlight=False)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
         self._bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
@@ -73,8 +62,7 @@ class BenchProgress:
 
     def left(self) -> str:
         """Return about how long the others will take, by the pace so far; "" before the first is done."""
-        done = sum(SECONDS[name] for name in self._names[: self._done])
-        rest = sum(SECONDS[name] for name in self._names[self._done :])
+        done, rest = sum(self._shares[: self._done]), sum(self._shares[self._done :])
         if not done or not rest:
             return ""
         seconds = rest / done * (time.monotonic() - self._begin)

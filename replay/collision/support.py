@@ -120,6 +120,7 @@ def _list_cells(
     `starts` and `listed` are those of half the side, or one list for all cells of side 1.
     """
     count, half = 0, side // 2
+    least = np.empty((4, 4))  # directions to a cell's corners, and how high is high enough
     for cell in range(8 * side * side):
         octant, row, column = cell // (side * side), cell // side % side, cell % side
         finer[cell] = count
@@ -132,15 +133,20 @@ def _list_cells(
             height = _height(flat, listed[e], x, y, z)
             if height > top:
                 top, best = height, listed[e]
+        corners = 0
+        for corner in range(4):
+            u, v = row + corner % 2, column + corner // 2
+            if u + v <= side:
+                x, y, z = _direction(octant, u / side, v / side)
+                least[corners, 0], least[corners, 1], least[corners, 2] = x, y, z
+                least[corners, 3] = _height(flat, best, x, y, z) - margin
+                corners += 1
         for e in range(starts[parent], starts[parent + 1]):
             i = listed[e]
             kept = False
-            for corner in range(4):
-                u, v = row + corner % 2, column + corner // 2
-                if u + v > side:
-                    continue
-                x, y, z = _direction(octant, u / side, v / side)
-                kept = kept or _height(flat, i, x, y, z) >= _height(flat, best, x, y, z) - margin
+            for corner in range(corners):
+                x, y, z, low = least[corner]
+                kept = kept or _height(flat, i, x, y, z) >= low
             if kept:
                 if count < len(found):
                     found[count] = i

@@ -93,13 +93,14 @@ def _not_inside(x: Floats, y: Floats) -> Integers:
     """Return which points may be on the hull: those that are not between a roof and a floor of others."""
     n, buckets = len(x), int(math.sqrt(len(x)))
     low, width = x.min(), (x.max() - x.min()) / buckets
+    scale = 1.0 / max(width, _INSIDE)
     every = np.arange(n)
     if not width > _INSIDE:
         return every
     bucket = np.empty(n, np.int64)
     highest, lowest = np.full(buckets, -1, np.int64), np.full(buckets, -1, np.int64)
     for k in range(n):
-        b = min(int((x[k] - low) / width), buckets - 1)
+        b = min(int((x[k] - low) * scale), buckets - 1)
         bucket[k] = b
         if highest[b] < 0 or y[k] > y[highest[b]]:
             highest[b] = k

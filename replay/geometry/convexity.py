@@ -19,7 +19,7 @@ from numba import float64, int64
 from replay.geometry.facets import ROUNDING
 from replay.geometry.hull import extreme_points, to_unit_box
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
-from replay.geometry.winding import components, sides
+from replay.geometry.winding import Sides, components, sides
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
@@ -53,7 +53,7 @@ class ConvexPiece(NamedTuple):
     strictly: bool
 
 
-def convex_piece(points: Floats, faces: Integers) -> ConvexPiece | None:
+def convex_piece(points: Floats, faces: Integers, found: Sides | None = None) -> ConvexPiece | None:
     """Return the corners of a closed surface if it is convex, else None.
 
     Convex is a surface of which no corner is further outside the plane of a face than `ROUNDING` of the largest
@@ -62,13 +62,15 @@ def convex_piece(points: Floats, faces: Integers) -> ConvexPiece | None:
     Args:
         points: (p, 3) [m], distinct and sorted.
         faces: (n, 3) indices of them, counter-clockwise from outside, each of some area.
+        found: `sides(faces)`, of any sense, if they are at hand.
     """
     used = np.zeros(len(points), dtype=np.bool_)
     used[faces] = True
     corners, faces = points[used], (np.cumsum(used) - 1)[faces]
     local, centre, scale = to_unit_box(corners)
     slack = ROUNDING * float(np.max(np.abs(corners))) / scale
-    found = sides(faces)
+    if found is None or not used.all():
+        found = sides(faces)
     among = _at_edges(local, faces, found.face, found.first, found.ends, slack)
     if among == _NOT:
         return None

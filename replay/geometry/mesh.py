@@ -121,7 +121,7 @@ def solid_from_triangles(triangles: Floats) -> Solid:
         notes.append(_on_welding(points, taken_for, "so that triangles repeat"))
     faces, source = alike(points, faces, found if faces is known else None)
     flat = flat[source]
-    again = copies(faces)
+    again = copies(faces, found if faces is known else None)
     repeats = int(np.count_nonzero(again & ~flat))
     if again.any():
         if repeats:
@@ -150,7 +150,7 @@ def solid_from_triangles(triangles: Floats) -> Solid:
         seen = openness(triangles, closing)
         closing = closing if seen.has_inside else NO_CAPS
         notes.append(_on_openness(joints, seen))
-    convex = convex_piece(points, faces) if watertight else None
+    convex = convex_piece(points, faces, None if flat.any() else found) if watertight else None
     return Solid(
         triangles,
         pieces=() if convex is None else (convex.corners,),

@@ -74,7 +74,8 @@ def _shells(triangles: Floats, parts: Parts) -> list[Shell]:
     apart = np.count_nonzero(~parts.closed) <= _MOST_OPEN_PARTS
     for which in groups:
         if parts.closed[parts.label[which[0]]]:
-            found.append(Shell(which, triangles[which], none, signed_volume(triangles[which])))
+            own = triangles if len(groups) == 1 else triangles[which]
+            found.append(Shell(which, own, none, signed_volume(own)))
         elif parts.one_sided[parts.label[which[0]]]:
             continue
         elif not apart or not _add_open(found, triangles, which):

@@ -1,6 +1,7 @@
 """`replay bench`."""
 
 import contextlib
+import io
 import json
 import os
 import re
@@ -9,11 +10,10 @@ import sys
 
 import pytest
 
-from replay.bench import distance, start
+from replay.bench import distance, results, start
 from replay.bench.goals import Goal
 from replay.bench.report import Report
-from replay.cli.bench import BENCHMARKS
-from replay.cli.bench_progress import SECONDS
+from replay.cli import bench_progress
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 
@@ -60,8 +60,29 @@ def test_what_peers_say_on_stderr_is_in_the_report_and_not_on_the_terminal(tmp_p
     assert capfd.readouterr().err == "afterwards\n"
 
 
-def test_every_benchmark_has_its_share_of_the_time():
-    assert set(BENCHMARKS) == set(SECONDS)
+@pytest.mark.parametrize(
+    ("before", "left"),
+    [
+        ({}, ", about 4 min left"),
+        ({"a": 1.0, "b": 20.0, "c": 0.5}, ", about 41 min left"),
+        ({"a": 1.0, "b": 20.0}, ", about 4 min left"),
+        ({"a": 100.0, "b": 1.0, "c": 1.0}, ", less than a minute left"),
+    ],
+)
+def test_time_left_goes_by_the_pace_and_an_earlier_run(before, left, monkeypatch):
+    monkeypatch.setattr(bench_progress.time, "monotonic", iter([0.0, 120.0]).__next__)
+    said = io.StringIO()
+    progress = bench_progress.BenchProgress(["a", "b", "c"], before, said)
+    progress.done(120.0)
+    assert said.getvalue() == f"replay: bench a: 120 s{left}\n"
+
+
+def test_an_earlier_run_is_read_from_its_report(tmp_path):
+    assert results.earlier_seconds(tmp_path) == {}
+    results.write([Report("a", seconds=1.5), Report("b", seconds=2.0)], tmp_path)
+    assert results.earlier_seconds(tmp_path) == {"a": 1.5, "b": 2.0}
+    (tmp_path / "bench.json").write_text('{"benchmarks": {"a": {"seconds": "many"}}}')
+    assert results.earlier_seconds(tmp_path) == {}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of its own")
