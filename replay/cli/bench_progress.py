@@ -46,7 +46,7 @@ class BenchProgress:
     def __exit__(self, *_: object) -> None:
         self._bars.stop()
         compiling.tell_by(self._of_kernels)
-        measure.tell_by(str)
+        measure.tell_by(measure.silent)
 
     def follow(self, case: str) -> None:
         """Show what is measured."""

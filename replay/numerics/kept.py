@@ -36,10 +36,11 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
 
     @wraps(function)
     def ask(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
-        if sum(map(len, _content((args, kwargs)))) > _LARGEST:
+        parts = [*_content((args, kwargs))]
+        if sum(map(len, parts)) > _LARGEST:
             return function(*args, **kwargs)
         digest = hashlib.sha256(name.encode())
-        for part in _content((args, kwargs)):
+        for part in parts:
             digest.update(part)
         key = digest.digest()
         with _lock:
