@@ -1,4 +1,4 @@
-"""Mesh files as vertices and faces: OBJ and PLY read here, STL and GLB by trimesh once they are known to be whole."""
+"""Mesh files as vertices and faces: binary STL, OBJ and PLY read here, others by trimesh once they are whole."""
 
 from __future__ import annotations
 
@@ -68,6 +68,8 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         announced = 0
         if ending == ".stl":
             announced = stl_check.check(data)
+            if stl_check.is_binary(data):
+                return stl_check.triangles(data)
         else:
             data = glb_file.bare(data)
     except ValueError as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.kept import kept
 from replay.sensing.kind import Color, Drawing
 from replay.sensing.kinds import KINDS
 
@@ -98,6 +99,7 @@ class Meshes:
         return self.vertices[begin : self.first_vertex[k + 1]], index
 
 
+@kept
 def indexed(bodies: Sequence[Floats]) -> Meshes:
     """Return triangles (t, 3, 3) [m] of bodies with each vertex once: all in one pass, because bodies are many."""
     triangles = np.concatenate([np.zeros((0, 3, 3)), *bodies]) + 0.0  # -0.0 and 0.0 are one vertex
