@@ -7,6 +7,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+from replay import limits
 from replay.batch.case import CaseResult, CaseStatus, describe
 from replay.batch.written import RESULT
 from replay.errors import NoSpaceError, WriteError, printable
@@ -15,8 +16,6 @@ from replay.logs.part_file import UNFINISHED, append_lines, refuse_link, write_f
 KINDS = (".mcap", ".rrd")
 LOG = "log.txt"
 """Name of the file that holds what a scenario said."""
-_LAST = 1 << 16
-"""Bytes of it that are shown at most."""
 
 
 def begin(folder: Path) -> None:
@@ -56,8 +55,8 @@ def said(folder: Path) -> list[str]:
     with contextlib.suppress(OSError):
         if log.is_file():
             with log.open("rb") as stream:
-                stream.seek(max(log.stat().st_size - _LAST, 0))
-                return stream.read(_LAST).decode(errors="replace").splitlines()
+                stream.seek(max(log.stat().st_size - limits.LOG_SHOWN, 0))
+                return stream.read(limits.LOG_SHOWN).decode(errors="replace").splitlines()
     return []
 
 
