@@ -17,7 +17,7 @@ from replay.collision.simplex import (
     nearest_on_tetrahedron,
     nearest_on_triangle,
 )
-from tests.amounts import cases
+from tests.amounts import COMPILED, cases
 
 
 @numba.njit
@@ -100,7 +100,8 @@ def test_the_nearest_point_is_that_of_the_nearest_feature(count):
             length = np.linalg.norm(v)
             assert np.asarray(v) @ expected == pytest.approx(length * np.linalg.norm(expected), rel=1e-9, abs=1e-18)
             features.add(tuple(shares > 0.0))
-    assert len(features) >= 2**count - 1 - (count == 4)  # every corner, edge and face was nearest at some time
+    if COMPILED:  # every corner, edge and face was nearest at some time
+        assert len(features) >= 2**count - 1 - (count == 4)
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])

@@ -10,7 +10,7 @@ import pytest
 
 from replay.collision.support import FEW, MARGIN, candidates, farthest, make_sets
 from replay.geometry import primitives
-from tests.amounts import cases
+from tests.amounts import COMPILED, cases
 
 
 @numba.njit
@@ -25,13 +25,13 @@ def listed(sets, k, x, y, z):
 
 def bodies():
     rng = np.random.default_rng(1)
-    ball = rng.normal(size=(400, 3))
+    ball = rng.normal(size=(max(40, cases(400)), 3))
     ball /= np.linalg.norm(ball, axis=1)[:, None]
     return [
         primitives.cube(1.0).vertices,
         0.5 * ball + (3.0, -2.0, 1.0),
         ball * (1.0, 0.01, 5.0),
-        primitives.cylinder(0.3, 2.0, 1e-3).vertices,
+        primitives.cylinder(0.3, 2.0, 1e-3 if COMPILED else 0.05).vertices,
         rng.normal(size=(FEW, 3)),
         rng.normal(size=(FEW + 1, 3)),
     ]
