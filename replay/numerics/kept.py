@@ -25,6 +25,9 @@ MOST: Final = 128 << 20
 _LARGEST = 16 << 20
 """Bytes of arguments: to tell larger ones apart takes a while, and they seldom come twice."""
 
+_OBJECT = 1024
+"""Bytes that an answer takes besides its content, roughly."""
+
 _answers: OrderedDict[bytes, tuple[Any, int]] = OrderedDict()
 _total = 0
 """Bytes of them."""
@@ -52,7 +55,7 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
                 known: Answer = _answers[key][0]
                 return known
         answer = function(*args, **kwargs)
-        size = sum(map(len, _content(answer)))
+        size = _OBJECT + sum(map(len, _content(answer)))
         with _lock:
             _total += size - _answers.get(key, (None, 0))[1]  # another thread may have been faster
             _answers[key] = answer, size
