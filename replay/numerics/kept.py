@@ -25,7 +25,12 @@ MOST: Final = 128 << 20
 _LARGEST = 16 << 20
 """Bytes of arguments: to tell larger ones apart takes a while, and they seldom come twice."""
 
+_OBJECT = 1024
+"""Bytes that an answer takes besides its content, roughly."""
+
 _answers: OrderedDict[bytes, tuple[Any, int]] = OrderedDict()
+_total = 0
+"""Bytes of them."""
 _lock = threading.Lock()
 
 
@@ -36,6 +41,7 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
 
     @wraps(function)
     def ask(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
+        global _total  # noqa: PLW0603
         parts = [*_content((args, kwargs))]
         if sum(map(len, parts)) > _LARGEST:
             return function(*args, **kwargs)
@@ -49,11 +55,12 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
                 known: Answer = _answers[key][0]
                 return known
         answer = function(*args, **kwargs)
-        size = sum(map(len, _content(answer)))
+        size = _OBJECT + sum(map(len, _content(answer)))
         with _lock:
+            _total += size - _answers.get(key, (None, 0))[1]  # another thread may have been faster
             _answers[key] = answer, size
-            while sum(of for _, of in _answers.values()) > MOST:
-                _answers.popitem(last=False)
+            while _total > MOST:
+                _total -= _answers.popitem(last=False)[1][1]
         return answer
 
     return ask
@@ -61,8 +68,10 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
 
 def forget() -> None:
     """Keep no answer: who measures how long it takes to find them."""
+    global _total  # noqa: PLW0603
     with _lock:
         _answers.clear()
+        _total = 0
 
 
 def _content(value: Any) -> Iterator[memoryview | bytes]:

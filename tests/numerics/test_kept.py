@@ -96,7 +96,7 @@ def test_functions_do_not_share_answers():
 
 def test_the_latest_answers_are_kept_as_long_as_there_is_room(asked, monkeypatch):
     answer, calls = asked
-    monkeypatch.setattr(kept, "MOST", 3 * 8100)
+    monkeypatch.setattr(kept, "MOST", 3 * 9100)
     for question in (1, 2, 3, 1, 4):
         answer(question)
     assert len(calls) == 4
