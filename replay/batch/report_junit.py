@@ -10,8 +10,6 @@ from xml.etree import ElementTree
 import replay
 from replay.batch.judged import Judged, Regression, RegressVerdict
 from replay.comparison.report_junit import clean
-from replay.comparison.report_text import text
-from replay.comparison.runs import RunDifference
 from replay.errors import printable
 
 SUITE = "replay.regress"
@@ -77,7 +75,7 @@ def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
 
 
 def _details(found: Regression, item: Judged) -> str:
-    if item.comparison is not None and item.verdict is RegressVerdict.DIFFERENT:
-        return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
+    if item.finding is not None and item.finding.report and item.verdict is RegressVerdict.DIFFERENT:
+        return item.finding.report
     log = Path(found.run.directory) / item.name / "log.txt"
     return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])

@@ -77,3 +77,21 @@ class ShardOf(click.ParamType[Any]):
             return Shard.parse(str(value))
         except InvalidValue as error:
             self.fail(str(error))
+
+
+class RrdOf(click.ParamType[Any]):
+    """`failing`, `failing:20`, `all` or `none`."""
+
+    name = "rrd"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return it as `batch.regress.Rrd`."""
+        from replay.batch.regress import Rrd
+
+        found = re.fullmatch(r"(failing|all|none)|failing:([1-9][0-9]{0,8})", value) if isinstance(value, str) else None
+        if isinstance(value, str) and found is None:
+            self.fail(f"{value!r} is none of failing, failing:N, all, none", param, ctx)
+        if found is None:
+            return value
+        kind: Any = found[1] or "failing"
+        return Rrd(kind, int(found[2])) if found[2] else Rrd(kind)
