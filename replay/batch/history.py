@@ -23,6 +23,7 @@ class Night:
         verdicts: of each scenario.
         failing: scenarios that need attention.
         results: numbers by the name of the measure, then by scenario; see `scenario.measures`.
+        units: of the results, by the name of the measure.
         accepted: when a baseline was accepted last before this night; "" when nobody knows.
     """
 
@@ -32,6 +33,7 @@ class Night:
     failing: frozenset[str]
     results: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     accepted: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def nights(path: Path, wanted: Callable[[str], bool] = lambda name: False) -> Iterator[Night]:
@@ -56,7 +58,15 @@ def nights(path: Path, wanted: Callable[[str], bool] = lambda name: False) -> It
                 results = {name: values for name, values in entry.get("results", {}).items() if wanted(name)}
                 failing = frozenset(entry["failing"])
                 accepted = entry.get("accepted", "")
-                yield Night(entry["time"], entry["version"], entry["verdicts"], failing, results, accepted)
+                yield Night(
+                    entry["time"],
+                    entry["version"],
+                    entry["verdicts"],
+                    failing,
+                    results,
+                    accepted,
+                    entry.get("units", {}),
+                )
     except (FileNotFoundError, NotADirectoryError):
         return
     except (OSError, UnicodeDecodeError) as error:
@@ -112,6 +122,7 @@ def append_night(path: Path, night: Night, *, named: bool = False) -> None:
         "failing": sorted(night.failing),
         "verdicts": dict(night.verdicts),
         "accepted": night.accepted,
+        "units": dict(night.units),
         "results": {name: dict(values) for name, values in night.results.items()},
     }
     append_lines(path, [json_line(entry)], named=named)

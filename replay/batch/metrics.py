@@ -35,11 +35,13 @@ def write_metrics(path: Path, results: Iterable[CaseResult]) -> None:
     write_file(path, stream.getvalue())
 
 
-def for_history(results: Iterable[CaseResult]) -> dict[str, dict[str, float]]:
-    """Return the numbers by name and scenario."""
+def for_history(results: Iterable[CaseResult]) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """Return the numbers by name and scenario, and their units by name."""
     found: dict[str, dict[str, float]] = {}
+    units: dict[str, str] = {}
     for result in results:
         for measure in result.measures:
             if measure.value is not None:
+                units[measure.name] = measure.unit
                 found.setdefault(measure.name, {})[result.name] = float(f"{measure.value:.{_DIGITS}g}")
-    return found
+    return found, units

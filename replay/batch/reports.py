@@ -69,9 +69,9 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         write_file(directory / RUN, json.dumps(told, indent=1) + "\n")
     if readable and not found.run.interrupted:
         with _kept(problems):
-            numbers = for_history(found.run.results)
+            numbers, units = for_history(found.run.results)
             accepted = last_accepted(found.baseline)
-            night = Night(started, replay.__version__, verdicts(found), failing, numbers, accepted)
+            night = Night(started, replay.__version__, verdicts(found), failing, numbers, accepted, units)
             append_night(history, night, named=named)
     if problems:
         raise problems[0]

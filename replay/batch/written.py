@@ -59,6 +59,7 @@ class WrittenNight(TypedDict):
     verdicts: dict[str, str]
     failing: list[str]
     accepted: NotRequired[str]
+    units: NotRequired[dict[str, str]]
     results: NotRequired[dict[str, dict[str, float]]]
 
 

@@ -31,6 +31,7 @@ COMMANDS = {
     "diff": "say what differs between two recordings or two run folders",
     "regress": "run scenarios and compare each with its baseline",
     "accept": "make a run's recordings the baseline",
+    "trend": "say how results went from night to night",
     "view": "show recordings in the rerun viewer, or make a picture",
     "bench": "time methods and peers on the same questions, and check their answers",
 }
