@@ -18,6 +18,7 @@ from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenMeasure, WrittenResult
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -139,6 +140,7 @@ def _measure(row: WrittenMeasure) -> Measure:
 def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     """Run one scenario into its folder and return what became of it; recordings that exist are replaced."""
     from replay.recording.record import record_blocks
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.scene import build
     from replay.simulation import Simulation
 
@@ -148,7 +150,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check, unseen, measures = scene.expectation_check(), Unseen(scene.layout), Measures(scene.layout)
-        blocks = _checked(simulation.blocks(), check, unseen, measures)
+        first = FirstFrame(scenario, scene.layout)
+        blocks = _checked(simulation.blocks(), check, unseen, measures, first)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -169,7 +172,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
+        notes=(*scene.notes, *(n for suite in simulation.suites.values() for n in suite.notes()), *first.lines()),
         between_frames=unseen.lines(),
         measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results()),
     )
@@ -190,9 +193,10 @@ def describe(result: CaseResult) -> list[str]:
 
 
 def _checked(
-    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, measures: Measures
+    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, measures: Measures, first: FirstFrame
 ) -> Iterator[FrameBlock]:
     for block in blocks:
+        first.update(block.collision, block.readings)
         measures.update(block.time, block.collision, block.readings)
         check.update(block.time, block.collision, block.readings)
         unseen.update(block.collision)

@@ -77,5 +77,7 @@ def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
 def _details(found: Regression, item: Judged) -> str:
     if item.finding is not None and item.finding.report and item.verdict is RegressVerdict.DIFFERENT:
         return item.finding.report
+    if item.finding is not None and item.finding.effects:
+        return "\n".join([item.message, *map(str, item.finding.effects), f"cause: {item.finding.causes.name}"])
     log = Path(found.run.directory) / item.name / "log.txt"
     return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import replay
 from replay.batch.accepted import last_accepted
+from replay.batch.groups import groups
 from replay.batch.history import Night, Past, append_night, nights
 from replay.batch.judged import INDEX, JUNIT, METRICS, SUMMARY, Regression, verdicts
 from replay.batch.metrics import MAIN, for_history, write_metrics
@@ -40,6 +41,7 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
         past = Past(nights(history, MAIN.__eq__), MAIN)
     readable = not problems
     failing = frozenset(item.name for item in found.judged if not item.verdict.fine)
+    causes = {item.name: group.name for group in groups(found.judged) for item in group.members}
     started = found.run.started.isoformat(timespec="seconds")
     directory = found.run.directory
     told = {
@@ -51,6 +53,10 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
             item.name: {
                 "verdict": item.verdict.value,
                 **({"message": item.message} if item.message else {}),
+                **({"cause": causes[item.name]} if item.name in causes else {}),
+                **({"finding": item.finding.as_json()} if item.finding is not None and item.finding.count else {}),
+                **({"tags": list(item.tags)} if item.tags else {}),
+                "source": item.source,
                 **({"since": past.since.get(item.name, started)} if item.name in failing else {}),
             }
             for item in found.judged

@@ -26,6 +26,8 @@ from replay.scenario.shapes import MeshPart
 _TEXTS = (".yaml", ".yml")
 _SHOWN = 3
 """Changes that the name of several is made of."""
+_CHANGES = 50
+"""Changes of inputs that are told; a description that was imported anew has thousands."""
 _TEXT_LINES = 200
 """Lines of a difference of texts that are kept."""
 
@@ -128,7 +130,8 @@ def _inputs(baseline: Path, candidate: Path, a: Provenance, b: Provenance) -> tu
         if name not in bodies and not _is_text(name) and _original(a, name) != _original(b, name):
             sizes = (f"{len(files[name])} bytes" if name in files else "none" for files in (files_a, files_b))
             changed.append(f"file {name} {' -> '.join(sizes)}")
-    return tuple(changed), text
+    more = [f"and {count(len(changed) - _CHANGES, 'more change')}"] if len(changed) > _CHANGES else []
+    return (*changed[:_CHANGES], *more), text
 
 
 def _original(provenance: Provenance, name: str) -> str:

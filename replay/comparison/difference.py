@@ -215,8 +215,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Rule):
         expires = None if value.expires is None else value.expires.isoformat()
         tolerance = dataclasses.asdict(value.tolerance)
+        only = {"scenarios": list(value.scenarios)} if value.scenarios else {}
         link = {} if value.link is None else {"link": value.link}
-        return {"signals": list(value.signals), **tolerance, "reason": value.reason, **link, "expires": expires}
+        return {"signals": list(value.signals), **tolerance, "reason": value.reason, **link, "expires": expires, **only}
     if dataclasses.is_dataclass(value):
         return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, tuple | list):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NotRequired
 
 from typing_extensions import TypedDict
 
@@ -21,11 +22,18 @@ class RunScenario(TypedDict):
     status: str
 
 
+class RunVerdict(TypedDict):
+    """What run.json says of the comparison of one scenario, as far as it is read."""
+
+    cause: NotRequired[str]
+
+
 class WrittenRun(TypedDict):
     """run.json, as far as it is read."""
 
     scenarios: dict[str, RunScenario]
     interrupted: bool
+    verdicts: NotRequired[dict[str, RunVerdict]]
 
 
 def read_run(folder: Path) -> WrittenRun:
