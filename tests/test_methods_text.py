@@ -42,7 +42,14 @@ def is_there(name: str) -> bool:
     """Return whether a file or folder of that name is in the source tree; one without a folder may be anywhere."""
     if any((base / name).exists() for base in (ROOT, PACKAGE)):
         return True
-    return "/" not in name and any(path.name == name for path in SOURCES)
+    return "/" not in name and (any(path.name == name for path in SOURCES) or name in names_that_are_written())
+
+
+@functools.cache
+def names_that_are_written() -> frozenset[str]:
+    """Return the names of files that the code writes: texts in its sources that end as files do."""
+    pattern = r'"(?:\{\w+\})?([\w-]+\.(?:' + "|".join(ENDINGS) + '))"'
+    return frozenset(name for path in PACKAGE.rglob("*.py") for name in re.findall(pattern, path.read_text()))
 
 
 def resolves(dotted: str) -> bool:

@@ -44,7 +44,7 @@ class Acceptance:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Accepted:
     """Which scenarios of a run are accepted: those that fit all that is asked for.
 
     Attributes:
@@ -69,14 +69,14 @@ class Choice:
         return bool(self.select or self.leave_out or self.group)
 
 
-ALL = Choice()
+ALL = Accepted()
 
 
 def _fits_any(name: str, globs: tuple[str, ...]) -> bool:
     return any(name == glob or fits(name, glob) for glob in globs)
 
 
-def plan_acceptance(directory: Path, baseline: Path, chosen: Choice = ALL) -> Acceptance:
+def plan_acceptance(directory: Path, baseline: Path, chosen: Accepted = ALL) -> Acceptance:
     """Return what accepting a run folder, or a part of it, would change.
 
     Raises:

@@ -67,6 +67,11 @@ class Finding:
     causes: Causes = NO_CAUSES
     report: str = ""
 
+    @property
+    def told_of(self) -> bool:
+        """Whether there is anything to tell: an effect, or a change beside the results."""
+        return bool(self.count or self.causes.changes)
+
     @staticmethod
     def of(baseline: Path, effects: Sequence[Effect], causes: Causes, report: str) -> Finding:
         """Return what is kept."""

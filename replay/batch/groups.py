@@ -11,7 +11,7 @@ from replay.comparison.effects import Severity
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class CauseGroup:
     """Scenarios with the same change of input or model, or with the same failure.
 
     Attributes:
@@ -35,7 +35,7 @@ class Group:
         return self.explained, self.severity, -self.members[0].size, -len(self.members), self.name
 
 
-def groups(judged: Iterable[Judged]) -> tuple[Group, ...]:
+def groups(judged: Iterable[Judged]) -> tuple[CauseGroup, ...]:
     """Return the groups of the scenarios that need attention."""
     found: dict[tuple[bool, tuple[str, ...]], list[Judged]] = {}
     names: dict[tuple[bool, tuple[str, ...]], str] = {}
@@ -44,15 +44,16 @@ def groups(judged: Iterable[Judged]) -> tuple[Group, ...]:
             explained, key, name = _cause(item)
             found.setdefault((explained, key), []).append(item)
             names[explained, key] = name
-    made = (
-        Group(names[key], key[0], tuple(sorted(members, key=lambda item: item.order))) for key, members in found.items()
-    )
+    made = [
+        CauseGroup(names[key], key[0], tuple(sorted(members, key=lambda item: item.order)))
+        for key, members in found.items()
+    ]
     return tuple(sorted(made, key=lambda group: group.order))
 
 
 def _cause(item: Judged) -> tuple[bool, tuple[str, ...], str]:
     """Return whether a scenario's failure is explained, what tells it from others, and its name."""
-    if item.finding is not None and (item.finding.count or item.finding.causes.changes):
+    if item.finding is not None and item.finding.told_of:
         causes = item.finding.causes
         return bool(causes.changes), causes.changes or (causes.name,), causes.name
     if item.verdict is RegressVerdict.BROKEN and item.result is not None:

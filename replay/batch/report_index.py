@@ -18,7 +18,7 @@ from typing import Any
 from urllib.parse import quote
 
 import replay
-from replay.batch.groups import Group, groups
+from replay.batch.groups import CauseGroup, groups
 from replay.batch.history import Past
 from replay.batch.judged import PAGE, Judged, Regression, RegressVerdict
 from replay.batch.metrics import MAIN
@@ -72,7 +72,7 @@ def address(item: Judged) -> str:
     return f"{quote(os.fsencode(item.name))}/{PAGE}"
 
 
-def _data(ordered: Sequence[Judged], grouped: Sequence[Group], past: Past) -> dict[str, Any]:
+def _data(ordered: Sequence[Judged], grouped: Sequence[CauseGroup], past: Past) -> dict[str, Any]:
     """Return what the script shows: lists of texts, and rows that refer to them by number."""
     number = {item.name: k for k, group in enumerate(grouped) for item in group.members}
     tags = sorted({tag for item in ordered for tag in item.tags})

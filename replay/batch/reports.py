@@ -54,7 +54,7 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
                 "verdict": item.verdict.value,
                 **({"message": item.message} if item.message else {}),
                 **({"cause": causes[item.name]} if item.name in causes else {}),
-                **({"finding": item.finding.as_json()} if item.finding is not None and item.finding.count else {}),
+                **({"finding": item.finding.as_json()} if item.finding is not None and item.finding.told_of else {}),
                 **({"tags": list(item.tags)} if item.tags else {}),
                 "source": item.source,
                 **({"since": past.since.get(item.name, started)} if item.name in failing else {}),

@@ -21,7 +21,7 @@ PLOTS = 500
 
 
 @dataclass(frozen=True)
-class Curve:
+class NightCurve:
     """A measure of a scenario over nights.
 
     Attributes:
@@ -53,7 +53,7 @@ class Trend:
     times: tuple[str, ...]
     accepted: tuple[bool, ...]
     failing: tuple[frozenset[str], ...]
-    curves: tuple[Curve, ...]
+    curves: tuple[NightCurve, ...]
 
 
 def read_trend(history: Path, *, measures: Iterable[str] = (), scenarios: Iterable[str] = ()) -> Trend:
@@ -73,7 +73,7 @@ def read_trend(history: Path, *, measures: Iterable[str] = (), scenarios: Iterab
         (name, of) for night in found for of, values in night.results.items() for name in values if scenario.match(name)
     }
     curves = tuple(
-        Curve(name, of, units.get(of, ""), tuple(night.results.get(of, {}).get(name) for night in found))
+        NightCurve(name, of, units.get(of, ""), tuple(night.results.get(of, {}).get(name) for night in found))
         for name, of in sorted(names)
     )
     accepted = [b.accepted != a.accepted and bool(b.accepted) for a, b in pairwise(found)]
@@ -147,7 +147,7 @@ class _Drawing:
     high: str
 
 
-def _drawing(trend: Trend, curve: Curve) -> _Drawing:
+def _drawing(trend: Trend, curve: NightCurve) -> _Drawing:
     low, high = min(curve.known), max(curve.known)
     span = high - low or max(abs(high), 1.0)
     middle = 0.0 if high > low else 0.5

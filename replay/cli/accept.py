@@ -16,7 +16,7 @@ from replay.cli.terminal import put
 from replay.cli.values import PathName
 
 if TYPE_CHECKING:
-    from replay.batch.accept import Choice
+    from replay.batch.accept import Accepted
 
 
 @click.command()
@@ -40,15 +40,15 @@ def accept(
 
     A run that was interrupted, or of which a scenario that is to be accepted failed, is refused.
     """
-    from replay.batch.accept import Choice
+    from replay.batch.accept import Accepted
     from replay.batch.claim import claim
 
-    chosen = Choice(select, leave_out, group)
+    chosen = Accepted(select, leave_out, group)
     with claim(rundir, shared=True), claim(baseline):  # what is shown is what is stored
         return _accept(rundir, baseline, chosen, reason, yes)
 
 
-def _accept(rundir: Path, baseline: Path, chosen: Choice, reason: str, yes: bool) -> ExitCode:
+def _accept(rundir: Path, baseline: Path, chosen: Accepted, reason: str, yes: bool) -> ExitCode:
     from replay.batch.accept import plan_acceptance
 
     plan = plan_acceptance(rundir, baseline, chosen)
