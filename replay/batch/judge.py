@@ -128,7 +128,7 @@ class Judge:
         why, problems = _why(case)
         drawn: tuple[Plot, ...] = ()
         try:
-            drawn = plots(found, pair)
+            drawn = plots(found, pair, limits)
         except Exception as error:
             problems.append(_odd("it cannot be drawn", error, case.candidate))
         if self._overlays > 0:
