@@ -114,7 +114,7 @@ def test_links_lead_to_files_that_are_there(page):
     pages = [link.evaluate("element => element.href") for link in page.locator(".group a").all()]
     assert len(pages) == 3
     for address in pages:
-        inside = page.context.new_page()
+        inside = page.context.browser.new_page()
         inside.goto(address)
         links = [link.evaluate("element => element.href") for link in inside.locator("p a").all()]
         inside.close()
