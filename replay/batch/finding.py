@@ -75,7 +75,7 @@ class Finding:
     @staticmethod
     def of(baseline: Path, effects: Sequence[Effect], causes: Causes, report: str) -> Finding:
         """Return what is kept."""
-        kept = tuple(Effect(e.severity, e.size, e.text, e.subject, e.signals[:1]) for e in effects[:_KEPT])
+        kept = tuple(Effect(e.severity, e.size, e.text, e.subject, e.signals[:1], e.at) for e in effects[:_KEPT])
         return Finding(baseline, kept, len(effects), causes, report[:_REPORT])
 
     def as_json(self) -> dict[str, Any]:

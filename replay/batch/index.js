@@ -26,7 +26,7 @@ function text(parent, tag, content, className) {
 }
 
 function element(row) {
-  const [name, address, verdict, , , message, since, , curve] = row;
+  const [name, address, verdict, , , message, since, , picture, curve] = row;
   const [key, word, fine, left] = data.verdicts[verdict];
   const details = document.createElement("details");
   details.className = `scenario ${key}${fine ? " fine" : ""}`;
@@ -37,11 +37,11 @@ function element(row) {
   if (message) summary.append(`: ${message}`);
   if (curve) text(summary, "span", ` ${curve}`, "curve").title = "smallest clearance of the last nights";
   if (!fine) text(summary, "span", ` (${since ? `since ${since}` : "for the first time"})`, "note");
-  details.addEventListener("toggle", () => open(details, name, address));
+  details.addEventListener("toggle", () => open(details, name, address, picture));
   return details;
 }
 
-function open(details, name, address) {
+function open(details, name, address, picture) {
   if (!details.open || details.childElementCount > 1) return;
   if (!address) {
     text(details, "p", "It was not run.");
@@ -49,6 +49,12 @@ function open(details, name, address) {
   }
   const link = text(text(details, "p", ""), "a", "on a page of its own");
   link.href = address;
+  if (picture) {
+    const image = document.createElement("img");
+    image.src = picture;
+    image.alt = `${name} at its worst moment, the baseline on the left and this run on the right`;
+    details.append(image);
+  }
   const frame = document.createElement("iframe");
   frame.src = address;
   frame.title = `what differs in ${name}`;

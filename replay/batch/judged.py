@@ -16,6 +16,8 @@ from replay.comparison.effects import Severity
 INDEX, JUNIT, SUMMARY, METRICS = "index.html", "junit.xml", "summary.md", "metrics.parquet"
 REPORTS = (INDEX, JUNIT, SUMMARY, METRICS)
 """Names of the reports in a run folder."""
+PICTURE = "worst.png"
+"""Name of the picture of a scenario's worst moment in its folder."""
 PAGE = "report.html"
 """Name of a scenario's own page in its folder."""
 OVERLAY = "{name}.difference.rrd"

@@ -17,7 +17,7 @@ from replay.batch.claim import claim
 from replay.batch.create import create_baselines, recording_of
 from replay.batch.history import check_history
 from replay.batch.judge import Judge, MissingBaseline, unjudged
-from replay.batch.judged import OVERLAY, PAGE, REPORTS, Judged, Regression, RegressVerdict
+from replay.batch.judged import OVERLAY, PAGE, PICTURE, REPORTS, Judged, Regression, RegressVerdict
 from replay.batch.report_case import again
 from replay.batch.run import Execution, run_all
 from replay.batch.run_file import Run
@@ -52,6 +52,7 @@ def regress(
     rules_file: str = "",
     missing: MissingBaseline = "fail",
     rrd: Rrd = FAILING,
+    pictures: int = 0,
     model: Model | None = None,
     model_name: str = "",
     history: Path | None = None,
@@ -71,6 +72,7 @@ def regress(
         rules_file: where they come from, for reports.
         missing: what a scenario without a baseline is: a failure, a new baseline, or left out.
         rrd: which scenarios get rerun recordings; those that differ also get one that shows both runs.
+        pictures: of how many scenarios that differ the worst moment is rendered; needs what shows both runs.
         model: replaces the scenarios' own models.
         model_name: how the user named it, for reports.
         history: file that the reports will append to, to find out now that it cannot be.
@@ -125,6 +127,10 @@ def regress(
                 recorded = [item.name for item in attention if item.result and item.result.status.recorded]
                 failing = set(recorded[: rrd.most])
                 _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
+            if pictures and not run.interrupted:
+                from replay.batch.pictures import take_pictures
+
+                take_pictures(sorted(judged.values(), key=lambda item: item.order), directory, pictures, watch)
         except KeyboardInterrupt:
             run = dataclasses.replace(run, interrupted=True)
             unstored = [
@@ -155,7 +161,7 @@ def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
 def _forget(directory: Path, names: Sequence[str], *, drawings: bool) -> None:
     """Remove an earlier night's reports and pictures, which would stand beside recordings of this one."""
     own = [name for name in names if not (directory / name).is_symlink()]
-    kinds = ("{name}.rrd", OVERLAY, PAGE) if drawings else (OVERLAY, PAGE)
+    kinds = (*(("{name}.rrd",) if drawings else ()), OVERLAY, PAGE, PICTURE)
     shown = [directory / name / kind.format(name=name) for name in own for kind in kinds]
     for file in (*(directory / report for report in REPORTS), *shown):
         with contextlib.suppress(OSError):

@@ -20,7 +20,7 @@ from urllib.parse import quote
 import replay
 from replay.batch.groups import CauseGroup, groups
 from replay.batch.history import Past
-from replay.batch.judged import PAGE, Judged, Regression, RegressVerdict
+from replay.batch.judged import PAGE, PICTURE, Judged, Regression, RegressVerdict
 from replay.batch.metrics import MAIN
 from replay.batch.sparkline import sparkline
 from replay.comparison import report_html
@@ -56,7 +56,7 @@ def index(found: Regression, past: Past) -> str:
         counts=[(verdict, found.count(verdict)) for verdict in _ORDER if found.count(verdict)],
         severities=[one for one in Severity if any(not i.verdict.fine and i.severity is one for i in ordered)],
         tags=sorted({tag for item in ordered for tag in item.tags}),
-        data=_packed(_data(ordered, grouped, past)),
+        data=_packed(_data(found, ordered, grouped, past)),
         script=_markup(script),
         allowed=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         count=count,
@@ -67,12 +67,12 @@ def index(found: Regression, past: Past) -> str:
     return page
 
 
-def address(item: Judged) -> str:
-    """Return the address of a scenario's page as seen from the night's."""
-    return f"{quote(os.fsencode(item.name))}/{PAGE}"
+def address(item: Judged, file: str = PAGE) -> str:
+    """Return the address of a scenario's page, or of another file of its, as seen from the night's."""
+    return f"{quote(os.fsencode(item.name))}/{file}"
 
 
-def _data(ordered: Sequence[Judged], grouped: Sequence[CauseGroup], past: Past) -> dict[str, Any]:
+def _data(found: Regression, ordered: Sequence[Judged], grouped: Sequence[CauseGroup], past: Past) -> dict[str, Any]:
     """Return what the script shows: lists of texts, and rows that refer to them by number."""
     number = {item.name: k for k, group in enumerate(grouped) for item in group.members}
     tags = sorted({tag for item in ordered for tag in item.tags})
@@ -89,6 +89,7 @@ def _data(ordered: Sequence[Judged], grouped: Sequence[CauseGroup], past: Past) 
                 printable(item.message[:_MESSAGE]),
                 "" if item.verdict.fine else past.since.get(item.name, ""),
                 [tags.index(tag) for tag in item.tags],
+                address(item, PICTURE) if (found.run.directory / item.name / PICTURE).is_file() else "",
                 sparkline(curve) if len([value for value in curve if value is not None]) > 1 else "",
             ]
         )

@@ -58,6 +58,7 @@ class Effect:
         text: in words and numbers: "contact 33 ms later".
         subject: the pair, the sensor, the joint or the link: "forearm/tube | person/body".
         signals: full names of all signals that differ of it, the one that the text is about first.
+        at: the moment to look at [s]; None where there is none.
     """
 
     severity: Severity
@@ -65,6 +66,7 @@ class Effect:
     text: str
     subject: str = ""
     signals: tuple[str, ...] = ()
+    at: float | None = None
 
     def __str__(self) -> str:
         return f"{self.text}: {self.subject}" if self.subject else self.text
@@ -110,7 +112,16 @@ def _effect(key: tuple[str, str], items: list[SignalDifference], limits: Mapping
         severity, worst, text = _sensor(items)
         subject = topic.split("/", 2)[2]
     rest = (item.signal.full_name for item in items if item is not worst)
-    return Effect(severity, size(worst), text, subject, (worst.signal.full_name, *rest))
+    return Effect(severity, size(worst), text, subject, (worst.signal.full_name, *rest), _moment(worst))
+
+
+def _moment(item: SignalDifference) -> float:
+    """Return when a signal differs in the way that matters: at its first wrong event, or its worst value."""
+    wrong = [event for event in item.events if not event.allowed]
+    moments = [event.candidate or event.baseline for event in wrong]
+    if moments and moments[0] is not None:
+        return moments[0].time
+    return item.first.time if item.worst_abs is None else item.worst_abs.at.time
 
 
 def size(item: SignalDifference) -> float:

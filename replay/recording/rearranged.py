@@ -32,17 +32,7 @@ def write_rearranged(file: Path, target: Path, *, camera: Camera | None, only_sc
     """
     result = RerunFile(target, overwrite=True)
     try:
-        stream = result.open("replay: rearranged")
-        stream.send_recording_name(file.stem)
-        found = Contents()
-        with readable(file) as reader:
-            found.look_from(reader)
-            for chunk in reader.stream():
-                if not str(chunk.entity_path).startswith("/__"):
-                    stream.send_chunks(chunk)
-                    found.take(chunk)
-        if not found.eyes:
-            raise ViewerError(f"{file}: says nothing of how its scene is looked at; is it a recording of replay?")
+        found = copied(file, result)
         eye, end = _eye(camera, *found.eyes[0]), blueprint.axis_until(found.end)
         view = blueprint.scene_view(eye)
         result.arrange(blueprint.whole(view) if only_scene else blueprint.recording(found.charts, eye, end))
@@ -51,6 +41,22 @@ def write_rearranged(file: Path, target: Path, *, camera: Camera | None, only_sc
     except BaseException:
         result.discard()
         raise
+
+
+def copied(file: Path, result: RerunFile) -> Contents:
+    """Copy what a file holds, but for its arrangement; return what that is."""
+    stream = result.open("replay: rearranged")
+    stream.send_recording_name(file.stem)
+    found = Contents()
+    with readable(file) as reader:
+        found.look_from(reader)
+        for chunk in reader.stream():
+            if not str(chunk.entity_path).startswith("/__"):
+                stream.send_chunks(chunk)
+                found.take(chunk)
+    if not found.eyes:
+        raise ViewerError(f"{file}: says nothing of how its scene is looked at; is it a recording of replay?")
+    return found
 
 
 def _eye(camera: Camera | None, position: Floats, target: Floats) -> Any:
