@@ -10,6 +10,7 @@ from replay.batch.baseline import Baseline, Entry, check_name, check_scenario
 from replay.batch.case import CaseStatus
 from replay.comparison import wording
 from replay.comparison.difference import Difference, DiffVerdict
+from replay.comparison.effects import effects, headline
 from replay.comparison.provenance import FILES
 from replay.comparison.run_folder import read_run
 from replay.comparison.runs import diff
@@ -129,7 +130,9 @@ def _news(before: Path | None, recording: Path) -> str:
         if error.file != str(before):
             raise
         return f"replaces a baseline that cannot be read: {error.reason}"
-    return "" if _same(found) else wording.summary(found)
+    if _same(found):
+        return ""
+    return "; ".join(filter(None, [headline(effects(found)), wording.summary(found)]))
 
 
 def _same(found: Difference) -> bool:

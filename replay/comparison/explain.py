@@ -144,7 +144,7 @@ def _shares(field: Field, values: Floats, names: tuple[str, ...]) -> Iterator[st
     total = float(np.abs(values[np.isfinite(values)]).sum())
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), np.inf), kind="stable")
     told = [k for k in order.tolist() if values[k] != 0.0][:_SHARES]
-    yield f"  {field.name.replace('_', ' ')}:"
+    yield f"  {field.spoken}:"
     for k in told:
         share = f" ({values[k] / total:.1%})" if total > 0.0 and np.isfinite(values[k]) else ""
         yield f"    {names[k]} {quantities.shown(float(values[k]), field.unit, digits=6)}{share}"

@@ -24,8 +24,8 @@ sensors: {distance: {eye: {link: arm, pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0,
 """
 
 
-def scenario(lower="-90 deg", to="0.5", box="2", more=""):
-    text = (TEXT + more).replace("LOWER", lower).replace("TO", to).replace("BOX", box)
+def scenario(lower="-90 deg", to="0.2", box="2"):
+    text = TEXT.replace("LOWER", lower).replace("TO", to).replace("BOX", box)
     return load_sources("s.yaml", {"s.yaml": text.encode()})
 
 
