@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from replay.collision.closest_triangles import closest_triangles
 from replay.collision.columns import Between, Level
 from replay.comparison import quantities
-from replay.comparison.closest_triangles import closest_triangles
 from replay.errors import InvalidValue, ReplayError, count
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
@@ -202,7 +202,7 @@ def _pair(moment: _Moment, name: str) -> Iterator[str]:
     found = closest_triangles(*(transforms.apply(p, s.solid.triangles) for s, p in zip(shapes, poses, strict=True)))
     for shape, triangle, point in zip(shapes, found.triangles, found.points, strict=True):
         yield f"  closest: triangle {triangle} of {shape.name} at {_point(point)}"
-    yield f"  the surfaces there are {quantities.shown(found.distance, 'm', digits=6)} apart"
+    yield f"  the surfaces there are {quantities.shown(found.gap, 'm', digits=6)} apart"
     yield "  other versions of the method at this frame:"
     for option, choice in _choices():
         yield f"    collision.{option}.{choice}@{METHOD_REVISIONS[f'collision.{option}.{choice}']}: " + _pair_by(

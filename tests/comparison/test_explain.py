@@ -7,7 +7,7 @@ import replay
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.collision import gjk
-from replay.comparison.closest_triangles import closest_triangles
+from replay.collision.closest_triangles import closest_triangles
 from tests.batch import scenes
 
 
@@ -76,7 +76,7 @@ def test_the_closest_triangles_are_those_of_all_pairs(seed):
     a += [random.uniform(0.5, 3.0), 0.0, 0.0]
     found = closest_triangles(a, b)
     every = np.array([[gjk.distance(one, other).distance for other in b] for one in a])
-    assert found.distance == pytest.approx(every.min(), rel=1e-12, abs=1e-15)
+    assert found.gap == pytest.approx(every.min(), rel=1e-12, abs=1e-15)
     assert every[found.triangles] == pytest.approx(every.min(), rel=1e-12, abs=1e-15)
-    if found.distance > 0.0:
-        assert np.linalg.norm(found.points[0] - found.points[1]) == pytest.approx(found.distance, rel=1e-9)
+    if found.gap > 0.0:
+        assert np.linalg.norm(found.points[0] - found.points[1]) == pytest.approx(found.gap, rel=1e-9)

@@ -15,12 +15,12 @@ class ClosestTriangles:
     """Where two surfaces are closest.
 
     Attributes:
-        distance: [m]; 0 where they meet.
+        gap: [m], 0 where they meet.
         triangles: index of one triangle of each.
         points: (2, 3) [m], the closest point on each.
     """
 
-    distance: float
+    gap: float
     triangles: tuple[int, int]
     points: Floats
 
@@ -44,16 +44,16 @@ def closest_triangles(a: Floats, b: Floats) -> ClosestTriangles:
     reach = float(np.linalg.norm(b.reshape(-1, 3) - middle, axis=1).max())
     nearest = np.linalg.norm(centres[0] - middle, axis=1) - radii[0] - reach
     for i in np.argsort(nearest, kind="stable").tolist():
-        if nearest[i] > best.distance:
+        if nearest[i] > best.gap:
             break
         bounds = np.linalg.norm(centres[1] - centres[0][i], axis=1) - radii[1] - radii[0][i]
-        (close,) = np.nonzero(bounds < best.distance)
+        (close,) = np.nonzero(bounds < best.gap)
         for j in close[np.argsort(bounds[close], kind="stable")].tolist():
-            if bounds[j] >= best.distance:
+            if bounds[j] >= best.gap:
                 break
             found = distance(a[i], b[j])
-            if found.distance < best.distance:
+            if found.distance < best.gap:
                 best = ClosestTriangles(found.distance, (i, j), np.stack((found.point_a, found.point_b)))
-            if best.distance == 0.0:
+            if best.gap == 0.0:
                 return best
     return best
