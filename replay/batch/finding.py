@@ -80,7 +80,8 @@ class Finding:
 
     def as_json(self) -> dict[str, Any]:
         """Return what run.json holds of it: the worst effect and the causes."""
-        causes = {key: list(lines) for key, lines in vars(self.causes).items() if lines and key != "text"}
+        told = ((key, getattr(self.causes, key)) for key in ("inputs", "model", "libraries", "code"))
+        causes = {key: list(lines) for key, lines in told if lines}
         worst = [
             {"severity": e.severity.name.lower(), "size": _finite(e.size), "text": e.text, "subject": e.subject}
             for e in self.effects[:1]

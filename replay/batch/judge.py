@@ -168,7 +168,8 @@ def _why(case: Case) -> tuple[Causes, list[str]]:
     try:
         return causes(case.baseline, case.candidate), []
     except Exception as error:
-        return Causes(), [_odd("its causes cannot be told", error, case.candidate)]
+        why = _odd("its causes cannot be told", error, case.candidate)
+        return Causes(unknown="its causes cannot be told"), [why]
 
 
 def unjudged(name: str, result: CaseResult) -> Judged:

@@ -42,6 +42,7 @@ class Causes:
         libraries: "library numpy 2.3.0 -> 2.4.0".
         code: the package itself.
         text: the difference of the scenarios' texts, as `diff -u` writes it; "" when they are the same.
+        unknown: why nobody can tell what has changed; "" as a rule.
     """
 
     inputs: tuple[str, ...] = ()
@@ -49,6 +50,7 @@ class Causes:
     libraries: tuple[str, ...] = ()
     code: tuple[str, ...] = ()
     text: str = ""
+    unknown: str = ""
 
     @property
     def changes(self) -> tuple[str, ...]:
@@ -58,6 +60,8 @@ class Causes:
     @property
     def name(self) -> str:
         """The changes in one line, or what there is to say of a difference that nothing explains."""
+        if self.unknown:
+            return f"unexplained: {self.unknown}"
         if not self.changes:
             return f"unexplained: nothing but the code changed ({', '.join(self.code)})" if self.code else _NOTHING
         more = len(self.changes) - _SHOWN

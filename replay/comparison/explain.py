@@ -49,7 +49,7 @@ class _Moment:
         return world
 
 
-def explain(path: Path, signal: str, at: float) -> list[str]:
+def explain(path: Path, signal: str, at: float, *, slow: bool = False) -> list[str]:
     """Return lines that say why a signal of a recording is what it is at a moment.
 
     Args:
@@ -57,6 +57,7 @@ def explain(path: Path, signal: str, at: float) -> list[str]:
         signal: topic of a sensor ("/distance/tip"), a pair ("/collision/arm/rod|table/top"), or the full name of one of
             their signals, as `replay diff` tells it.
         at: moment [s]; the frame at or before it is looked at.
+        slow: ask methods that take seconds a frame too.
 
     Raises:
         RecordingError: the recording cannot be read, or lacks a file of its scenario.
@@ -73,7 +74,7 @@ def explain(path: Path, signal: str, at: float) -> list[str]:
     row = int(np.searchsorted(recording.time, round(at * SECOND), side="right")) - 1
     moment = _Moment(recording, scene, row, _poses(scene, recording, row))
     lines = [f"{signal} at frame {row} ({recording.time[row] / SECOND:.9g} s)"]
-    lines += _pair(moment, name) if kind == "" else _sensor(moment, kind, name)
+    lines += _pair(moment, name) if kind == "" else _sensor(moment, kind, name, slow)
     return lines
 
 
@@ -100,7 +101,7 @@ def _poses(scene: Scene, recording: Recording, row: int) -> LinkPoses:
     return scene.linkage.forward(states.positions, states.free_poses)
 
 
-def _sensor(moment: _Moment, kind: str, name: str) -> Iterator[str]:
+def _sensor(moment: _Moment, kind: str, name: str, slow: bool) -> Iterator[str]:
     layout, described = moment.recording.layout, KINDS[kind]
     number = layout.sensors[kind].index(name)
     columns = moment.recording.readings[kind]
@@ -122,8 +123,10 @@ def _sensor(moment: _Moment, kind: str, name: str) -> Iterator[str]:
         yield from _shape(moment, layout.shapes[index], columns, number)
     yield "  other versions of the method at this frame:"
     main = [field for field in columns.present() if field.chart]
-    for method in described.revisions:
-        yield f"    {kind}.{method}@{described.revisions[method]}: {_by(moment, kind, sensor, method, main)}"
+    for method, revision in described.revisions.items():
+        left_out = method in described.slow and not slow
+        said = "takes seconds; --slow asks it too" if left_out else _by(moment, kind, sensor, method, main)
+        yield f"    {kind}.{method}@{revision}: {said}"
 
 
 def _value(field: Field, value: Any, layout: Any) -> str:

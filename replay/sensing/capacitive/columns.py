@@ -33,7 +33,9 @@ class CapacitiveColumns(Columns):
     delta_output: Annotated[Floats, Field(unit="V", gate="saturated", spoken="output drop")]
     saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
     touching: Annotated[Flags, Field(begins=("touch",))]
-    per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]
+    per_object: Annotated[
+        Floats, Field(unit="F", gate="saturated", label="capacitance", spoken="share", each="objects")
+    ]
     increase: Annotated[Floats | None, Field(unit="F", gate="saturated", since=2)] = None
     error: Annotated[Floats | None, Field(unit="F", gate="unresolved", since=2)] = None
     unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3}, since=2)] = None
