@@ -33,7 +33,7 @@ from tests.fuzz.damage import build, metadata, record, text
 from tests.fuzz.doors import RECORDED, SCENARIO
 from tests.geometry.test_mesh_file import glb
 
-README = (Path(replay.__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+README = (Path(replay.__file__).parents[1] / "schemas" / "README.md").read_text(encoding="utf-8")
 HEAD = (1, text("") + text("x"))
 MESSAGE = record(5, struct.pack("<HIQQ", 1, 0, 5, 5))
 

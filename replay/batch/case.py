@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
+from replay.scenario.measures import Measure, Measures
 from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
-    from replay.batch.written import WrittenResult
+    from replay.batch.written import WrittenMeasure, WrittenResult
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -75,6 +77,7 @@ class CaseResult:
         memory: the most resident memory seen [bytes].
         notes: what a reader should know about the scene.
         between_frames: contacts that no frame shows, and what is not proven, a line each.
+        measures: its results as numbers: of its expectations, and extremes of its readings.
         reused: taken from an earlier run.
         no_space: it failed because the disk is full.
     """
@@ -91,6 +94,7 @@ class CaseResult:
     memory: int = 0
     notes: tuple[str, ...] = ()
     between_frames: tuple[str, ...] = ()
+    measures: tuple[Measure, ...] = ()
     reused: bool = False
     no_space: bool = False
 
@@ -108,6 +112,7 @@ class CaseResult:
             "counters": self.counters,
             "notes": list(self.notes),
             "between_frames": list(self.between_frames),
+            "results": [measure.as_json(self.name) for measure in self.measures],
         }
 
     @staticmethod
@@ -123,13 +128,19 @@ class CaseResult:
             counters=values["counters"],
             notes=tuple(values["notes"]),
             between_frames=tuple(values.get("between_frames", ())),
+            measures=tuple(map(_measure, values.get("results", ()))),
             reused=True,
         )
+
+
+def _measure(row: WrittenMeasure) -> Measure:
+    return Measure(row["name"], row["value"], row["unit"], row["time"], row["subject"], row["limit"], row["margin"])
 
 
 def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     """Run one scenario into its folder and return what became of it; recordings that exist are replaced."""
     from replay.recording.record import record_blocks
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.scene import build
     from replay.simulation import Simulation
 
@@ -138,8 +149,9 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     try:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
-        check, unseen = scene.expectation_check(), Unseen(scene.layout)
-        blocks = _checked(simulation.blocks(), check, unseen)
+        check, unseen, measures = scene.expectation_check(), Unseen(scene.layout), Measures(scene.layout)
+        first = FirstFrame(scenario, scene.layout)
+        blocks = _checked(simulation.blocks(), check, unseen, measures, first)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -160,8 +172,9 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
+        notes=(*scene.notes, *(n for suite in simulation.suites.values() for n in suite.notes()), *first.lines()),
         between_frames=unseen.lines(),
+        measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results()),
     )
 
 
@@ -179,8 +192,12 @@ def describe(result: CaseResult) -> list[str]:
     return lines
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen) -> Iterator[FrameBlock]:
+def _checked(
+    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, measures: Measures, first: FirstFrame
+) -> Iterator[FrameBlock]:
     for block in blocks:
+        first.update(block.collision, block.readings)
+        measures.update(block.time, block.collision, block.readings)
         check.update(block.time, block.collision, block.readings)
         unseen.update(block.collision)
         yield block

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NotRequired
 
 from typing_extensions import TypedDict
 
@@ -23,11 +24,18 @@ class RunScenario(TypedDict):
     status: str
 
 
+class RunVerdict(TypedDict):
+    """What run.json says of the comparison of one scenario, as far as it is read."""
+
+    cause: NotRequired[str]
+
+
 class WrittenRun(TypedDict):
     """run.json, as far as it is read."""
 
     scenarios: dict[str, RunScenario]
     interrupted: bool
+    verdicts: NotRequired[dict[str, RunVerdict]]
 
 
 def read_run(folder: Path) -> WrittenRun:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from replay.errors import Problem, count
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.names import matches
+from replay.scenario.unit_slips import beyond_a_turn
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def notes(
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, BetweenPart) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    found.extend(beyond_a_turn(scenario))
     found.extend(_sensor_notes(scenario, model or scenario.model))
     if (model or scenario.model).collision.between == "sampled":
         from replay.scenario.scene import primitive_solids

@@ -8,7 +8,7 @@ description imports at its top must be light: `replay validate` loads it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -98,6 +98,7 @@ class SensorKind(ABC):
         part: a sensor as it is written; `link` and `ignore` are among its keys.
         method: its methods as they are written.
         revisions: of each method; raised when its results change beyond the shipped rules, recorded with every result.
+        slow: the methods that take seconds a frame.
         models: its method in built-in models, by their names.
         expectation: what can be expected, as it is written; the key `name` names the sensor.
         expected: the same, as what is taken from the columns.
@@ -109,6 +110,7 @@ class SensorKind(ABC):
     part: type[Part]
     method: type[Method]
     revisions: ClassVar[Mapping[str, int]]
+    slow: ClassVar[Collection[str]] = ()
     models: ClassVar[Mapping[str, Method]] = {}
     expectation: type[Part]
     expected: Sequence[Expected]

@@ -8,7 +8,7 @@ from typing import Annotated
 from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns, Field
 
-_CHART = "Capacitive sensors: drop of the output voltage [V]"
+_CHART = "Capacitive sensors: output voltage [V]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,13 @@ class CapacitiveColumns(Columns):
     """
 
     capacitance: Annotated[Floats, Field(unit="F", gate="saturated")]
-    output_voltage: Annotated[Floats, Field(unit="V", gate="saturated")]
-    delta_output: Annotated[Floats, Field(unit="V", gate="saturated", chart=_CHART)]
+    output_voltage: Annotated[Floats, Field(unit="V", gate="saturated", chart=_CHART, spoken="output")]
+    delta_output: Annotated[Floats, Field(unit="V", gate="saturated", spoken="output drop")]
     saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
     touching: Annotated[Flags, Field(begins=("touch",))]
-    per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]
+    per_object: Annotated[
+        Floats, Field(unit="F", gate="saturated", label="capacitance", spoken="share", each="objects")
+    ]
     increase: Annotated[Floats | None, Field(unit="F", gate="saturated", since=2)] = None
     error: Annotated[Floats | None, Field(unit="F", gate="unresolved", since=2)] = None
     unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3}, since=2)] = None

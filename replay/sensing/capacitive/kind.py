@@ -35,6 +35,7 @@ class Capacitive(SensorKind):
     part = CapacitiveSensorPart
     method = CapacitiveMethod
     revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "bem": 1}
+    slow = ELECTROSTATIC
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation
     expected = (
