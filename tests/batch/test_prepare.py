@@ -36,14 +36,15 @@ ready = {(kernel.py_func.__qualname__, types) for kernel in kernels for types in
 for block in replay.simulate(scenario, model=model, savings=savings): pass
 kernels = [kernel for kernel in gc.get_objects() if isinstance(kernel, KernelDispatcher)]
 called = {(kernel.py_func.__qualname__, types) for kernel in kernels for types in kernel.overloads}
-print(len(ready), sorted(str(each) for each in called - ready))
+rare = {kernel.py_func.__qualname__ for kernel in kernels if hasattr(kernel, "rare")}
+print(len(ready), sorted(str(each) for each in called - ready if each[0] not in rare))
 """
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("savings", [True, False])
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_kernels_are_all_compiled_before_the_first_scenario(model, savings):
+def test_kernels_are_all_compiled_before_the_first_scenario_but_for_rare_ones(model, savings):
     given = pickle.dumps((scenes.with_meshes(), model, savings))
     done = subprocess.run([sys.executable, "-c", CALLED], check=True, capture_output=True, input=given)
     count, missed = done.stdout.decode().split(maxsplit=1)
