@@ -185,6 +185,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         """Return what was lowered as machine code that Python can call."""
         context, described = lowered.target_context, lowered.fndesc
         library = context.codegen().create_library(described.qualname)
+        library.environment = described.env_name
         library.enable_object_caching()
         with context.push_code_library(library):
             context.create_cpython_wrapper(
