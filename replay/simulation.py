@@ -13,9 +13,11 @@ from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.scenario.layout import Layout
 from replay.sensing.kinds import KINDS, of_kind
+from replay.sensing.readings import KindReadings
 
 if TYPE_CHECKING:
     from replay.collision.pipeline import CollisionPipeline
+    from replay.kinematics.linkage import LinkPoses
     from replay.kinematics.motion import Motion
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
@@ -94,18 +96,36 @@ class Simulation:
             for kind, sensors in scene.sensors.items()
             if sensors
         }
+        self._readings = {
+            kind: KindReadings(KINDS[kind], suite, scene.signals.get(kind)) for kind, suite in self.suites.items()
+        }
+        self._remembers = bool(scene.signals)
+        self._next = 0
 
     def __getattr__(self, kind: str) -> Any:
         return of_kind(self, kind, "suites")
 
     def block(self, first: int) -> FrameBlock:
-        """Return the block that begins at a frame; it depends on no other block."""
+        """Return the block that begins at a frame, the first of a block.
+
+        It depends on no other block; but where sensors have signal chains, those before it are computed first, unless
+        the last one asked for was the one before it.
+        """
+        if self._remembers and first != self._next:
+            for readings in self._readings.values():
+                readings.restart()
+            for earlier in range(0, first, self._block_frames):
+                self._block(earlier)
+        return self._block(first)
+
+    def _block(self, first: int) -> FrameBlock:
         last = min(first + self._block_frames, self.scene.frames)
         lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
         time = self.scene.time_ns(first - lead, last)
         states = self._motion.states(time / 1e9)
         poses = self.scene.linkage.forward(states.positions, states.free_poses)
         shown = poses.slice(lead, len(time))
+        self._next = last
         return FrameBlock(
             layout=self.scene.layout,
             first=first,
@@ -114,8 +134,13 @@ class Simulation:
             joint_velocities=states.velocities[lead:],
             link_poses=shown.world,
             collision=self.collision.run(poses, lead=lead, time=time, first=first) if self.collision else None,
-            readings={kind: suite.run(shown) for kind, suite in self.suites.items()},
+            readings={kind: self._read(kind, shown, first) for kind in self._readings},
         )
+
+    def _read(self, kind: str, poses: LinkPoses, first: int) -> Any:
+        columns = self._readings[kind].read(poses, first)
+        self._readings[kind].keep(columns, first)
+        return columns
 
     def blocks(self) -> Iterator[FrameBlock]:
         """Yield all blocks in order."""

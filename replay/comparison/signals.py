@@ -112,9 +112,13 @@ def _all_groups(recording: Recording) -> Iterator[Group]:
                 known = moments(field_, layout.pairs, "/collision", recording.events, recording.time)
             yield Group(field_, signals, getattr(recording.collision, field_.name), (), known, between)
     for kind, columns in recording.readings.items():
-        topics = [KINDS[kind].topic(sensor) for sensor in layout.sensors[kind]]
+        sensors = layout.sensors[kind]
         for field_ in _gates_first(columns.present()):
-            yield from _of_sensors(topics, field_, getattr(columns, field_.name), layout)
+            having = [k for k, sensor in enumerate(sensors) if layout.has(kind, sensor, field_)]
+            topics = [KINDS[kind].topic(sensors[k]) for k in having]
+            values = getattr(columns, field_.name)
+            told = values if len(having) == len(sensors) else values[:, having]
+            yield from _of_sensors(topics, field_, told, layout)
 
 
 def silent_fields(recording: Recording) -> set[tuple[str, str]]:

@@ -58,6 +58,8 @@ def tables(recording: Recording) -> dict[str, Table]:
         for sensor, name in enumerate(layout.sensors[kind]):
             table = result[KINDS[kind].topic(name)] = dict(time)
             for field in columns.present():
+                if not layout.has(kind, name, field):
+                    continue
                 values = getattr(columns, field.name)[:, sensor]
                 for k, each in enumerate(getattr(layout, field.each) if field.each else ()):
                     _add(table, f"{each} {field.label}", field, values[:, k], layout)

@@ -289,13 +289,19 @@ class _Assembly:
             topics = [self._topics[topic] for topic in map(KINDS[kind].topic, names) if topic in self._topics]
             if topics:
                 columns = KINDS[kind].columns
-                found[kind] = columns(**{field.name: self._of_sensors(topics, field) for field in columns.fields()})
+                read = [name for name in names if KINDS[kind].topic(name) in self._topics]
+                values = {}
+                for field in columns.fields():
+                    having = [self._layout.has(kind, name, field) for name in read]
+                    values[field.name] = self._of_sensors(topics, field, having)
+                found[kind] = columns(**values)
         return found
 
-    def _of_sensors(self, topics: list[Topic], field: Field) -> NDArray[Any] | None:
+    def _of_sensors(self, topics: list[Topic], field: Field, having: list[bool]) -> NDArray[Any] | None:
         if field.optional and not any(field.name in topic.columns for topic in topics):
-            return None  # its method has no such column
-        values = [self._field(topic, field) for topic in topics]
+            return None  # its method has no such column, or no sensor a signal
+        nothing = np.full(len(self._frames), field.nothing, dtype=field.type)
+        values = [self._field(topic, field) if has else nothing for topic, has in zip(topics, having, strict=True)]
         present = [value for value in values if value is not None]
         return np.stack(present, axis=1) if present else None
 
@@ -319,6 +325,10 @@ def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
         sensors={
             kind: tuple(name for name in names if KINDS[kind].topic(name) in topics)
             for kind, names in layout.sensors.items()
+        },
+        signals={
+            kind: tuple(name for name in names if KINDS[kind].topic(name) in topics)
+            for kind, names in layout.signals.items()
         },
     )
 

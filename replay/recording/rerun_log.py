@@ -79,7 +79,8 @@ class RerunWriter:
         for kind, columns in block.readings.items():
             for chart, field in blueprint.CHARTED[kind].items():
                 values = getattr(columns, field.name)
-                self._curves(block, chart, self._layout.sensors[kind], values, np.isfinite(values))
+                if values is not None:
+                    self._curves(block, chart, self._layout.sensors[kind], values, np.isfinite(values))
             for field in columns.fields():
                 if field.beam:
                     self._beams(block, kind, getattr(columns, field.name))

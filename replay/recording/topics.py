@@ -84,9 +84,10 @@ def frame_topics(layout: Layout, *, collision: bool, kinds: Mapping[str, Collect
         yield _topic("/collision", messages.COLLISION, example, _collision)
     for kind in KINDS.values():
         if kind.name in kinds:
-            example = _example(kinds[kind.name], layout)
             for index, name in enumerate(layout.sensors[kind.name]):
-                yield _topic(kind.topic(name), kind.message, example, _reading(kind.name, index))
+                fields = [field for field in kinds[kind.name] if layout.has(kind.name, name, field)]
+                topic, example = kind.topic(name), _example(fields, layout)
+                yield _topic(topic, kind.message, example, _reading(kind.name, index, fields))
     yield _topic("/joint_states", messages.JOINTS, _joints_example(layout), _joints)
 
 
@@ -187,10 +188,10 @@ def _values(block: FrameBlock, columns: Any, field: Field) -> Column:
     return np.broadcast_to(np.array(field.nothing, dtype=field.type), shape)
 
 
-def _reading(kind: str, sensor: int) -> Callable[[FrameBlock], Columns]:
+def _reading(kind: str, sensor: int, fields: Collection[Field]) -> Callable[[FrameBlock], Columns]:
     def columns(block: FrameBlock) -> Columns:
         found: Columns = {}
-        for field in block.readings[kind].present():
+        for field in fields:
             found |= components(field, getattr(block.readings[kind], field.name)[:, sensor])
         return found
 

@@ -18,6 +18,7 @@ from replay.scenario.expectations import PairExpectation
 from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
 from replay.scenario.problems import Path, did_you_mean
 from replay.sensing.kinds import KINDS
+from replay.sensing.signal.part import sampling_problems
 
 Finding = tuple[Path, str]
 """The path of a value, and the rule it breaks."""
@@ -227,6 +228,9 @@ def _sensors(names: Names) -> Iterator[Finding]:
                 if not names.links_matching(pattern):
                     rule = did_you_mean(pattern, names.parents, what="links are")
                     yield (*path, "ignore", index), f"matches no link; {rule}"
+            signal = getattr(sensor, "signal", None)
+            if signal is not None and names.rate is not None:
+                yield from (((*path, "signal", key), rule) for key, rule in sampling_problems(signal, names.rate))
             own = [shape.name for shape in names.shapes if shape.link == sensor.link]
             for place, shape in KINDS[kind].own_shapes(sensor).items():
                 if shape not in own:
@@ -265,6 +269,11 @@ def _expectations(names: Names) -> Iterator[Finding]:
             if isinstance(expected, KINDS[kind].expectation) and getattr(expected, kind) not in sensors:
                 rule = did_you_mean(getattr(expected, kind), sensors, what=f"{kind} sensors are")
                 yield (*path, kind), f"is no {kind} sensor; {rule}"
+            elif isinstance(expected, KINDS[kind].expectation) and getattr(expected, "measured", None) is not None:
+                sensor = sensors[getattr(expected, kind)]
+                if sensor is not None and sensor.signal is None:
+                    rule = f"is measured by no signal chain; give sensors.{kind}.{getattr(expected, kind)} a signal"
+                    yield (*path, "measured"), rule
 
 
 def _tested(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:

@@ -72,7 +72,8 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
     if kind == "missing":
         return _missing(found, last, root)
     if kind == "extra_forbidden":
-        known = list(owner.model_fields) if owner is not None else []
+        fields = {} if owner is None else owner.model_fields
+        known = [field.alias or name for name, field in fields.items()]
         above = find(root, path[:-1])
         place = above.keys.get(str(path[-1]), root.place) if above is not None else root.place
         return place.problem(f"{dotted(path)}: unknown key; {did_you_mean(str(path[-1]), known)}")

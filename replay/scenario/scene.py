@@ -27,6 +27,7 @@ from replay.scenario.names import matches
 from replay.scenario.notes import notes, piece_notes
 from replay.scenario.script import linkage, script
 from replay.sensing.kinds import KINDS, of_kind
+from replay.sensing.signal.chain import Chain, Signals
 from replay.sensing.target import Target, make_target
 
 Color = tuple[int, int, int, int]
@@ -66,6 +67,7 @@ class Scene:
         bodies, pairs: what is tested for collision; no bodies when no pair is.
         targets: what sensors sense, sorted by name; none when there are no sensors.
         sensors: by kind, sorted by name; those of a kind are `scene.distance_sensors` too.
+        signals: the signal chains of the kinds of which a sensor has one.
         layout: the names behind the columns of results.
         notes: what a reader should know about the scenario and its meshes, one line each.
     """
@@ -80,6 +82,7 @@ class Scene:
     pairs: tuple[Pair, ...]
     targets: tuple[Target, ...]
     sensors: Mapping[str, tuple[Any, ...]]
+    signals: Mapping[str, Signals]
     layout: Layout
     notes: tuple[str, ...]
 
@@ -142,6 +145,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
     scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
     sensors = {kind: _sensors(scenario, machine, kind, scene_shapes) for kind in KINDS}
+    signals = {kind: made for kind in KINDS if (made := _signals(scenario, kind)).chains}
     sensed = [shape for shape in scene_shapes if shape.sensed] if any(sensors.values()) else []
     targets = tuple(
         make_target(
@@ -162,6 +166,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         pairs=tuple(pair.name for pair in pairs),
         objects=names if any(sensors[kind] and _each_object(kind) for kind in KINDS) else (),
         sensors={kind: tuple(sensor.name for sensor in found) for kind, found in sensors.items()},
+        signals={kind: tuple(made.names()) for kind, made in signals.items()},
     )
     _check_expectations(scenario, layout)
     solids = {_link_and_shape(shape.name): shape.solid for shape in scene_shapes}
@@ -176,6 +181,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         pairs=pairs,
         targets=targets,
         sensors=sensors,
+        signals=signals,
         layout=layout,
         notes=(
             *(note.message for note in notes(scenario, model=model, solids=solids)),
@@ -289,6 +295,16 @@ def _sensors(scenario: Scenario, machine: Linkage, kind: str, scene_shapes: Sequ
         sensor = KINDS[kind].sensor(name, written, link, ignored)
         found.append(KINDS[kind].with_shapes(sensor, written, shapes))
     return tuple(found)
+
+
+def _signals(scenario: Scenario, kind: str) -> Signals:
+    """Return the signal chains of a kind's sensors."""
+    output, chains, rate = KINDS[kind].output, {}, Fraction(scenario.rate)
+    written = sorted(scenario.sensors.of(kind).items())
+    for column, (name, part) in enumerate(written):
+        if output is not None and part.signal is not None:
+            chains[column] = Chain(kind, name, part.signal, rate, output.substitute(part))
+    return Signals(chains, len(written))
 
 
 def _each_object(kind: str) -> bool:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from numpy.typing import NDArray
 
 from replay.language.fields import Part, rejected
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns
 
 if TYPE_CHECKING:
@@ -71,6 +71,21 @@ class Expected:
     inside: bool = True
 
 
+@dataclass(frozen=True)
+class Output:
+    """The number that a sensor's electronics make a signal of; the column `measured` holds the signal.
+
+    Attributes:
+        reading: takes the columns, returns (n, S): the ideal one, NaN where there is none.
+        beyond: takes the columns, returns (n, S): whether something is nearer than the sensor reads.
+        substitute: takes a sensor as it is written, returns what its filter takes where there is no reading.
+    """
+
+    reading: Callable[[Any], Floats]
+    beyond: Callable[[Any], Flags]
+    substitute: Callable[[Any], float]
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """How a sensor is drawn, in its link's frame [m].
@@ -101,6 +116,7 @@ class SensorKind(ABC):
         models: its method in built-in models, by their names.
         expectation: what can be expected, as it is written; the key `name` names the sensor.
         expected: the same, as what is taken from the columns.
+        output: what becomes a signal where a sensor as it is written has a `signal`; None where none can have one.
         columns: what it reads: (n, S, ...) of n frames and S sensors. A field keeps its place, which is its number in
             messages; a new one is the last.
     """
@@ -112,6 +128,7 @@ class SensorKind(ABC):
     models: ClassVar[Mapping[str, Method]] = {}
     expectation: type[Part]
     expected: Sequence[Expected]
+    output: ClassVar[Output | None] = None
     columns: type[Columns]
 
     @property

@@ -55,6 +55,7 @@ def test_field_numbers_stay_for_ever() -> None:
             "shape": 6,
             "triangle": 7,
             "case": 8,
+            "measured": 9,
         },
         "CapacitiveReading": {
             "capacitance": 1,
@@ -66,6 +67,7 @@ def test_field_numbers_stay_for_ever() -> None:
             "increase": 7,
             "error": 8,
             "unresolved": 9,
+            "measured": 10,
         },
     }
 

@@ -18,7 +18,7 @@ from replay.sensing.capacitive.part import (
     CapacitiveMethod,
     CapacitiveSensorPart,
 )
-from replay.sensing.kind import Drawing, Expected, Method, SensorKind, Suite
+from replay.sensing.kind import Drawing, Expected, Method, Output, SensorKind, Suite
 
 if TYPE_CHECKING:
     from replay.sensing.capacitive.sensor import CapacitiveSensor
@@ -40,7 +40,9 @@ class Capacitive(SensorKind):
     expected = (
         Expected("output", lambda columns: columns.output_voltage, unit="V"),
         Expected("saturated", lambda columns: columns.saturated),
+        Expected("measured", lambda columns: columns.measured, unit="V"),
     )
+    output = Output(lambda columns: columns.output_voltage, lambda columns: columns.saturated, lambda part: part.supply)
     columns = CapacitiveColumns
 
     def module(self) -> Any:
@@ -59,7 +61,7 @@ class Capacitive(SensorKind):
             Plate(name=plate, T_link_plate=written.pose.transform(), half_size=0.5 * np.array(written.size))
             for plate, written in sorted(part.plates.items())
         )
-        same = part.model_dump(exclude={"link", "plates", "back", "ignore"})
+        same = part.model_dump(exclude={"link", "plates", "back", "ignore", "signal"})
         return CapacitiveSensor(name=name, link=link, plates=plates, **same, ignored_links=ignored_links)
 
     def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[tuple[str | int, ...], str]:

@@ -9,7 +9,7 @@ import numpy as np
 from replay.numerics import transforms
 from replay.sensing.distance.columns import Detection, DistanceColumns
 from replay.sensing.distance.part import DistanceExpectation, DistanceMethod, DistanceSensorPart
-from replay.sensing.kind import Drawing, Expected, SensorKind
+from replay.sensing.kind import Drawing, Expected, Output, SensorKind
 
 if TYPE_CHECKING:
     from replay.sensing.distance.suite import DistanceSensor
@@ -32,6 +32,10 @@ class Distance(SensorKind):
     expected = (
         Expected("distance", lambda columns: columns.distance, unit="m", inside=False),
         Expected("detected", lambda columns: columns.status != Detection.NOTHING),
+        Expected("measured", lambda columns: columns.measured, unit="m"),
+    )
+    output = Output(
+        lambda columns: columns.distance, lambda columns: columns.status == Detection.TOO_CLOSE, lambda part: part.range
     )
     columns = DistanceColumns
 
