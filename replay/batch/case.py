@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
+from replay.scenario.guard_outcomes import lines
 from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenResult
+    from replay.guarding.outcome import GuardOutcomes
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -75,6 +77,8 @@ class CaseResult:
         memory: the most resident memory seen [bytes].
         notes: what a reader should know about the scene.
         between_frames: contacts that no frame shows, and what is not proven, a line each.
+        guards: what became of each trigger of a guard, see `guarding.outcome.Stop.as_json`; `reactions` says it in
+            lines for people.
         reused: taken from an earlier run.
         no_space: it failed because the disk is full.
     """
@@ -91,6 +95,8 @@ class CaseResult:
     memory: int = 0
     notes: tuple[str, ...] = ()
     between_frames: tuple[str, ...] = ()
+    guards: tuple[dict[str, Any], ...] = ()
+    reactions: tuple[str, ...] = ()
     reused: bool = False
     no_space: bool = False
 
@@ -108,6 +114,7 @@ class CaseResult:
             "counters": self.counters,
             "notes": list(self.notes),
             "between_frames": list(self.between_frames),
+            **({"guards": list(self.guards), "reactions": list(self.reactions)} if self.guards else {}),
         }
 
     @staticmethod
@@ -123,6 +130,8 @@ class CaseResult:
             counters=values["counters"],
             notes=tuple(values["notes"]),
             between_frames=tuple(values.get("between_frames", ())),
+            guards=tuple(values.get("guards", ())),
+            reactions=tuple(values.get("reactions", ())),
             reused=True,
         )
 
@@ -139,7 +148,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check, unseen = scene.expectation_check(), Unseen(scene.layout)
-        blocks = _checked(simulation.blocks(), check, unseen)
+        reactions = None if simulation.guarding is None else simulation.guarding.outcomes()
+        blocks = _checked(simulation.blocks(), check, unseen, reactions)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -151,7 +161,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
             seconds=seconds,
             no_space=isinstance(error, NoSpaceError),
         )
-    outcomes = tuple(check.finish())
+    stops = [] if reactions is None else reactions.stops()
+    outcomes = tuple(check.finish(stops))
     return CaseResult(
         scenario.name,
         CaseStatus.PASSED if all(outcome.passed for outcome in outcomes) else CaseStatus.BROKEN,
@@ -162,6 +173,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         seconds=time.perf_counter() - begin,
         notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
         between_frames=unseen.lines(),
+        guards=tuple(stop.as_json() for stop in stops),
+        reactions=tuple(lines(stops)),
     )
 
 
@@ -171,16 +184,20 @@ def describe(result: CaseResult) -> list[str]:
         return [f"{result.name}: {result.status.value}", *(f"  {line}" for line in result.error.splitlines())]
     pace = f" ({result.frames / result.seconds:.0f} a second)" if result.seconds > 0.0 else ""
     took = "reused" if result.reused else f"in {result.seconds:.1f} s{pace}"
-    lines = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
+    told = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
     for outcome in result.outcomes:
-        lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
-    lines.extend(f"  {line}" for line in result.between_frames)
-    lines.extend(f"  note: {note}" for note in result.notes)
-    return lines
+        told.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
+    told.extend(f"  {line}" for line in (*result.reactions, *result.between_frames))
+    told.extend(f"  note: {note}" for note in result.notes)
+    return told
 
 
-def _checked(blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen) -> Iterator[FrameBlock]:
+def _checked(
+    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, reactions: GuardOutcomes | None
+) -> Iterator[FrameBlock]:
     for block in blocks:
+        if reactions is not None:
+            reactions.update(block.time, block.collision)
         check.update(block.time, block.collision, block.readings)
         unseen.update(block.collision)
         yield block

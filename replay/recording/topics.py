@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from replay.collision.columns import CollisionColumns
+from replay.guarding.columns import GuardColumns
 from replay.kinematics.linkage import WORLD
 from replay.logs.mcap_writer import MessageRows, rows_of_chunk
 from replay.logs.wire import MessageShape, Slot, shape_of
@@ -82,6 +83,8 @@ def frame_topics(layout: Layout, *, collision: bool, kinds: Mapping[str, Collect
     if collision:
         example = _example(CollisionColumns.fields(), layout)
         yield _topic("/collision", messages.COLLISION, example, _collision)
+    if layout.guards:
+        yield _topic("/guards", messages.GUARDS, _example(GuardColumns.fields(), layout), _guards)
     for kind in KINDS.values():
         if kind.name in kinds:
             for index, name in enumerate(layout.sensors[kind.name]):
@@ -173,6 +176,11 @@ def _transforms(layout: Layout) -> Callable[[FrameBlock], Columns]:
 def _collision(block: FrameBlock) -> Columns:
     assert block.collision is not None
     return {field.name: _values(block, block.collision, field) for field in block.collision.fields()}
+
+
+def _guards(block: FrameBlock) -> Columns:
+    assert block.guards is not None
+    return {field.name: getattr(block.guards, field.name) for field in block.guards.fields()}
 
 
 def _values(block: FrameBlock, columns: Any, field: Field) -> Column:

@@ -24,6 +24,7 @@ _MERGED_MAPS: Final = {
     ("collision",),
     ("sensors",),
     *(("sensors", kind) for kind in KINDS),
+    ("guards",),
 }
 _MERGED_LISTS: Final = {("motion", "moves"), ("collision", "disable"), ("expect",)}
 

@@ -20,6 +20,7 @@ class Layout:
         shapes: names "link/shape" of the shapes that sensors sense, for columns that count them.
         pairs: P names "link/shape|link/shape" of the pairs that are tested.
         objects: O names of the shapes that sensors with a value for each shape sense.
+        guards: G names of guards.
         signals: names of the sensors with a signal chain, by kind.
         sensors: names by kind; those of a kind are `layout.distance_sensors` too, none where it is not there.
     """
@@ -30,6 +31,7 @@ class Layout:
     shapes: tuple[str, ...] = ()
     pairs: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
+    guards: tuple[str, ...] = ()
     sensors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     signals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -45,8 +47,9 @@ class Layout:
         return not column.signal or sensor in self.signals.get(kind, ())
 
     def to_json(self) -> dict[str, tuple[str, ...]]:
-        """Return all names as a recording's metadata holds them; of signals only where there are any."""
-        values = {key: names for key, names in vars(self).items() if key not in ("sensors", "signals")}
+        """Return all names as a recording's metadata holds them; of guards and signals only where there are any."""
+        values = {key: names for key, names in vars(self).items() if key not in ("sensors", "signals", "guards")}
+        values |= {"guards": self.guards} if self.guards else {}
         signals = {f"{kind}_signals": names for kind, names in self.signals.items() if names}
         return values | {f"{kind}_sensors": self.sensors.get(kind, ()) for kind in KINDS} | signals
 
@@ -61,6 +64,7 @@ class Layout:
         signals = {kind: tuple(values[f"{kind}_signals"]) for kind in KINDS if f"{kind}_signals" in values}
         return Layout(
             **{key: tuple(names) for key, names in groups.items()},
+            guards=tuple(values.get("guards", ())),
             sensors={kind: tuple(names) for kind, names in sensors.items()},
             signals=signals,
         )

@@ -12,6 +12,7 @@ from typing import Any, Final
 from pydantic import TypeAdapter, ValidationError
 
 from replay.collision.columns import MARGIN
+from replay.guarding.part import GuardPart
 from replay.language.fields import Part
 from replay.language.globs import Globs, fits
 from replay.language.node import Node
@@ -179,6 +180,11 @@ class Names:
         """Frames per second [Hz]."""
         found: Fraction | None = None if self.root.child("rate") is None else self._entry(Rate, "rate")
         return None if found is None else Fraction(found)
+
+    @cached_property
+    def guards(self) -> dict[str, GuardPart | None]:
+        """Guards by name."""
+        return {name: self._entry(GuardPart, "guards", name) for name in self._map("guards")}
 
     @property
     def tests_pairs(self) -> bool:

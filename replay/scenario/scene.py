@@ -19,6 +19,7 @@ from replay.numerics.arrays import Floats, Integers
 from replay.scenario import frames, shapes
 from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.expectations import PairExpectation
+from replay.scenario.guards import SceneGuards, scene_guards
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_model
 from replay.scenario.methods import Model
@@ -68,6 +69,7 @@ class Scene:
         targets: what sensors sense, sorted by name; none when there are no sensors.
         sensors: by kind, sorted by name; those of a kind are `scene.distance_sensors` too.
         signals: the signal chains of the kinds of which a sensor has one.
+        guards: what guards look at and do; None when there are none.
         layout: the names behind the columns of results.
         notes: what a reader should know about the scenario and its meshes, one line each.
     """
@@ -83,6 +85,7 @@ class Scene:
     targets: tuple[Target, ...]
     sensors: Mapping[str, tuple[Any, ...]]
     signals: Mapping[str, Signals]
+    guards: SceneGuards | None
     layout: Layout
     notes: tuple[str, ...]
 
@@ -166,22 +169,26 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         pairs=tuple(pair.name for pair in pairs),
         objects=names if any(sensors[kind] and _each_object(kind) for kind in KINDS) else (),
         sensors={kind: tuple(sensor.name for sensor in found) for kind, found in sensors.items()},
+        guards=tuple(sorted(scenario.guards)),
         signals={kind: tuple(made.names()) for kind, made in signals.items()},
     )
     _check_expectations(scenario, layout)
+    played = script(scenario)
+    guards = scene_guards(scenario.guards, Fraction(scenario.rate), machine, played, layout, signals)
     solids = {_link_and_shape(shape.name): shape.solid for shape in scene_shapes}
     return Scene(
         scenario=scenario,
         model=model,
         savings=savings,
         linkage=machine,
-        script=script(scenario),
+        script=played,
         shapes=scene_shapes,
         bodies=bodies,
         pairs=pairs,
         targets=targets,
         sensors=sensors,
         signals=signals,
+        guards=guards,
         layout=layout,
         notes=(
             *(note.message for note in notes(scenario, model=model, solids=solids)),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from numpy.typing import NDArray
 
 from replay.language.fields import Part, rejected
+from replay.language.units import Dimension
 from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns
 
@@ -79,11 +80,20 @@ class Output:
         reading: takes the columns, returns (n, S): the ideal one, NaN where there is none.
         beyond: takes the columns, returns (n, S): whether something is nearer than the sensor reads.
         substitute: takes a sensor as it is written, returns what its filter takes where there is no reading.
+        condition: what a guard may ask of it, as it is written; the key `name` of the kind names the sensor.
+        threshold: takes such a condition, returns below which value it holds.
+        dimension: of the reading.
+        charted: takes a sensor as it is written and a threshold, returns where this is in the first chart of the kind;
+            in that of `measured` it is itself.
     """
 
     reading: Callable[[Any], Floats]
     beyond: Callable[[Any], Flags]
     substitute: Callable[[Any], float]
+    condition: type[Part]
+    threshold: Callable[[Any], float]
+    dimension: Dimension
+    charted: Callable[[Any, float], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +150,22 @@ class SensorKind(ABC):
         """Return the topic of a sensor."""
         return f"/{self.name}/{sensor}"
 
-    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
-        """Return the sensors of a scene; see `simulation.simulate` for `savings`.
+    def suite(
+        self,
+        sensors: Sequence[Any],
+        targets: Sequence[Target],
+        method: Method,
+        *,
+        savings: bool,
+        watched: frozenset[str] = frozenset(),
+    ) -> Suite:
+        """Return the sensors of a scene.
+
+        Args:
+            sensors, targets, method: of the scene.
+            savings: see `simulation.simulate`.
+            watched: names of the sensors whose readings of a frame must not depend on the frames after it, because
+                guards look at them. Where a method computes each frame by itself, that is so anyway.
 
         Raises:
             MissingPackageError: the method names an engine that is not installed.

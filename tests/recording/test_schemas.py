@@ -14,7 +14,7 @@ from replay.recording import messages
 from replay.sensing.kinds import KINDS
 
 SCHEMAS = Path(replay.__file__).parents[1] / "schemas"
-OWN = [messages.COLLISION, *(kind.message for kind in KINDS.values())]
+OWN = [messages.COLLISION, messages.GUARDS, *(kind.message for kind in KINDS.values())]
 
 
 def made(name: str) -> FileDescriptorSet:
@@ -46,6 +46,7 @@ def test_field_numbers_stay_for_ever() -> None:
             "between": 5,
             "clearance_bound": 6,
         },
+        "GuardStates": {"state": 1, "condition": 2, "factor": 3, "rate": 4, "script_time": 5},
         "DistanceReading": {
             "status": 1,
             "distance": 2,

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from replay.language.units import VOLTAGE
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.part import (
     ELECTROSTATIC,
+    CapacitiveCondition,
     CapacitiveExpectation,
     CapacitiveMethod,
     CapacitiveSensorPart,
@@ -42,7 +44,15 @@ class Capacitive(SensorKind):
         Expected("saturated", lambda columns: columns.saturated),
         Expected("measured", lambda columns: columns.measured, unit="V"),
     )
-    output = Output(lambda columns: columns.output_voltage, lambda columns: columns.saturated, lambda part: part.supply)
+    output = Output(
+        reading=lambda columns: columns.output_voltage,
+        beyond=lambda columns: columns.saturated,
+        substitute=lambda part: part.supply,
+        condition=CapacitiveCondition,
+        threshold=lambda condition: condition.output.below,
+        dimension=VOLTAGE,
+        charted=lambda part, threshold: part.supply - threshold,
+    )
     columns = CapacitiveColumns
 
     def module(self) -> Any:
@@ -74,13 +84,22 @@ class Capacitive(SensorKind):
         """See `SensorKind`: what is behind the plates."""
         return replace(sensor, back=tuple((name, shapes[name]) for name in part.back))
 
-    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
+    def suite(
+        self,
+        sensors: Sequence[Any],
+        targets: Sequence[Target],
+        method: Method,
+        *,
+        savings: bool,
+        watched: frozenset[str] = frozenset(),
+    ) -> Suite:
         """See `SensorKind`."""
         if method.method not in ELECTROSTATIC:
             return super().suite(sensors, targets, method, savings=savings)
         from replay.sensing.electrostatics.suite import ElectrostaticSuite
 
-        return ElectrostaticSuite(sensors, targets, method=method.method, savings=savings, **method.options())
+        options = {"method": method.method, "savings": savings, "watched": watched, **method.options()}
+        return ElectrostaticSuite(sensors, targets, **options)
 
     def kernels(self, method: Method, *, savings: bool) -> tuple[Any, ...]:
         """See `SensorKind`."""

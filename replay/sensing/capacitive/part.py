@@ -91,6 +91,22 @@ class CapacitiveMethod(Method):
         return {}
 
 
+class OutputBelow(Part):
+    """A threshold of an output voltage."""
+
+    below: Voltage
+    """The threshold [V]; a saturated sensor is below it."""
+
+
+class CapacitiveCondition(Part):
+    """A capacitive sensor tells less than a threshold."""
+
+    capacitive: Name
+    """Name of the capacitive sensor."""
+    output: OutputBelow
+    """The threshold of its output voltage."""
+
+
 class OutputBounds(Part):
     """Bounds of an output voltage."""
 

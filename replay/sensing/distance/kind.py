@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from replay.language.units import LENGTH
 from replay.numerics import transforms
 from replay.sensing.distance.columns import Detection, DistanceColumns
-from replay.sensing.distance.part import DistanceExpectation, DistanceMethod, DistanceSensorPart
+from replay.sensing.distance.part import DistanceCondition, DistanceExpectation, DistanceMethod, DistanceSensorPart
 from replay.sensing.kind import Drawing, Expected, Output, SensorKind
 
 if TYPE_CHECKING:
@@ -35,7 +36,13 @@ class Distance(SensorKind):
         Expected("measured", lambda columns: columns.measured, unit="m"),
     )
     output = Output(
-        lambda columns: columns.distance, lambda columns: columns.status == Detection.TOO_CLOSE, lambda part: part.range
+        reading=lambda columns: columns.distance,
+        beyond=lambda columns: columns.status == Detection.TOO_CLOSE,
+        substitute=lambda part: part.range,
+        condition=DistanceCondition,
+        threshold=lambda condition: condition.below,
+        dimension=LENGTH,
+        charted=lambda part, threshold: threshold,
     )
     columns = DistanceColumns
 

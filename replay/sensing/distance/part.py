@@ -63,6 +63,15 @@ class DistanceMethod(Method):
         return {"count": 1000 if self.count is None else self.count, "engine": self.engine or "own"}
 
 
+class DistanceCondition(Part):
+    """A distance sensor tells less than a threshold."""
+
+    distance: Name
+    """Name of the distance sensor."""
+    below: Distance
+    """The threshold [m]; what is too close counts as below."""
+
+
 class DistanceBounds(Part):
     """Bounds of a distance."""
 
