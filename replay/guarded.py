@@ -12,6 +12,7 @@ from replay.collision.columns import Level
 from replay.guarding.columns import GuardColumns
 from replay.guarding.outcome import GuardOutcomes
 from replay.guarding.reaction import Reaction
+from replay.kinematics.linkage import LinkPoses
 from replay.kinematics.motion import Motion
 from replay.numerics.arrays import Flags, Floats
 from replay.scenario.guards import SceneGuards
@@ -19,11 +20,13 @@ from replay.sensing.readings import KindReadings
 
 if TYPE_CHECKING:
     from replay.collision.pipeline import CollisionPipeline
-    from replay.kinematics.linkage import LinkPoses
     from replay.scenario.scene import Scene
 
-LONGEST, SHORTEST = 128, 8
-"""Frames that are looked at together: the longest where nothing changes, the shortest after a change."""
+LONGEST, SHORTEST = 256, 8
+"""Frames that are looked at together: few at first and where a condition comes near its threshold."""
+
+EARLY, GROWTH = 0.7, 4
+"""The share of the frames until a condition may hold that are looked at next; at most so many times those before."""
 
 
 class Guarding:
@@ -43,7 +46,7 @@ class Guarding:
         self._readings = {kind: readings[kind] for kind in sorted(guards.watched)}
         self.reaction = Reaction(guards.guards, motion, scene.linkage.joints, guards.leaders)
         self._pipeline = _watching(scene, guards)
-        self._step = LONGEST
+        self._step = SHORTEST
 
     @property
     def motion(self) -> Motion:
@@ -58,15 +61,16 @@ class Guarding:
     def restart(self) -> None:
         """Go back to before the first frame."""
         self.reaction.restart()
-        self._step = LONGEST
+        self._step = SHORTEST
 
-    def run(self, first: int, last: int) -> tuple[GuardColumns, dict[str, Any]]:
+    def run(self, first: int, last: int) -> tuple[GuardColumns, dict[str, Any], LinkPoses]:
         """Decide frames first..last-1, which follow those decided before.
 
         Returns:
-            Their columns, and their readings of the kinds of sensors that guards look at.
+            Their columns, their readings of the kinds of sensors that guards look at, and their poses.
         """
         parts: dict[str, list[Any]] = {kind: [] for kind in self._readings}
+        placed: list[LinkPoses] = []
         begin = first
         while begin < last:
             end = min(begin + self._step, last)
@@ -85,10 +89,13 @@ class Guarding:
                 kept = _rows(columns[kind], decided)
                 readings.keep(kept, begin)
                 parts[kind].append(kept)
-            self._step = min(2 * self._step, LONGEST) if decided == end - begin else SHORTEST
+            placed.append(poses.slice(0, decided))
+            expected = min(EARLY * self.reaction.soonest(), GROWTH * self._step, LONGEST)
+            self._step = max(int(expected), SHORTEST)
             begin += decided
         found = {kind: _joined(pieces) for kind, pieces in parts.items()}
-        return self.reaction.columns(self._scene.time_ns(first, last) / 1e9), found
+        seconds = self._scene.time_ns(first, last) / 1e9
+        return self.reaction.columns(seconds), found, LinkPoses.joined(placed)
 
     def _clearances(self, poses: LinkPoses) -> Floats:
         """Return clearances (n, P) [m] of pairs that guards look at: 0 in contact, inf where beyond all thresholds."""

@@ -140,14 +140,19 @@ class Simulation:
         lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
         guards: GuardColumns | None = None
         known: dict[str, Any] = {}
+        placed: LinkPoses | None = None
         if self.guarding is not None:
-            guards, known = self.guarding.run(first, last)
+            guards, known, placed = self.guarding.run(first, last)
             self._motion = self.guarding.motion
             if self.collision is not None:
                 self.collision.follow(self._motion)
         time = self.scene.time_ns(first - lead, last)
         states = self._motion.states(time / 1e9)
-        poses = self.scene.linkage.forward(states.positions, states.free_poses)
+        if placed is None:
+            poses = self.scene.linkage.forward(states.positions, states.free_poses)
+        else:  # what guards were decided by
+            head = self.scene.linkage.forward(states.positions[:lead], states.free_poses[:lead])
+            poses = head.joined([head, placed])
         shown = poses.slice(lead, len(time))
         self._next = last
         return FrameBlock(

@@ -73,13 +73,16 @@ def peak(profile: Profile, clock: Clock, begin: float, end: float) -> tuple[floa
 
 def _stretches(profile: Profile, clock: Clock, begin: float, end: float) -> Iterator[_Stretch]:
     ends = np.append(clock.start[1:], math.inf)[: len(clock.start)]
-    rows = zip(clock.start, ends, clock.script, clock.rate, clock.ramp, strict=True)
-    for start, stop, script, rate, ramp in ((float(v) for v in row) for row in rows):
+    clocks = zip(clock.start, ends, clock.script, clock.rate, clock.ramp, strict=True)
+    for start, stop, script, rate, ramp in ((float(v) for v in row) for row in clocks):
         a, b = max(begin, start), min(end, stop)
         if not a < b or (rate, ramp) == (1.0, 0.0) or (rate, ramp) == (0.0, 0.0):
             continue
         s = Polynomial([script, rate, 0.5 * ramp])
-        for first, last, row in zip(profile.start, profile.end, profile.coefficients, strict=True):
+        passed = (float(s(a - start)), math.inf if math.isinf(b) else float(s(b - start)))
+        pieces = slice(np.searchsorted(profile.end, passed[0]), np.searchsorted(profile.start, passed[1], side="right"))
+        rows = zip(profile.start[pieces], profile.end[pieces], profile.coefficients[pieces], strict=True)
+        for first, last, row in rows:
             low, high = (
                 max(_when(s, float(first), b - start), a - start),
                 min(_when(s, float(last), b - start), b - start),

@@ -9,6 +9,9 @@ import numpy as np
 from replay.guarding.guard import Combined, Guard, Leaf, PairLeaf, SensorLeaf, SeparationLeaf, leaves
 from replay.numerics.arrays import Flags, Floats
 
+UNKNOWN = 64.0
+"""Frames until a threshold is passed, as far as anybody knows who has no reading."""
+
 Told = Callable[[str, int], tuple[Floats, Flags]]
 """Takes a kind and a column; returns what the sensor tells of n frames and whether it is of something too near."""
 
@@ -18,6 +21,9 @@ class Conditions:
 
     Args:
         guards: whose conditions they are.
+
+    Attributes:
+        soonest: in how many frames one may pass its threshold, if it goes on as between the last two looked at.
     """
 
     def __init__(self, guards: Sequence[Guard]) -> None:
@@ -29,6 +35,7 @@ class Conditions:
         """Go back to before the first frame: nothing holds."""
         self._last = [np.zeros((2, len(parts)), dtype=np.bool_) for parts in self._leaves]
         self._found: list[Flags] = []
+        self.soonest = np.inf
 
     def look(self, told: Told, clearance: Floats, velocity: Floats, script_velocity: Floats) -> tuple[Flags, Flags]:
         """Return whether conditions hold in n frames, and whether they do not count as gone for a release, (n, G) each.
@@ -41,12 +48,13 @@ class Conditions:
         """
         frames = len(velocity)
         holds = np.zeros((2, frames, len(self._guards)), dtype=np.bool_)
-        self._found = []
+        self._found, self.soonest = [], np.inf
         for g, guard in enumerate(self._guards):
             found = np.zeros((2, frames, len(self._leaves[g])), dtype=np.bool_)
             for k, leaf in enumerate(self._leaves[g]):
                 value, near, limits = self._value(guard, leaf, told, clearance, velocity)
                 known = ~np.isnan(value)
+                self.soonest = min(self.soonest, _frames_until(value, limits[0]))
                 for which, limit in enumerate(limits):
                     below = near | (value < limit)
                     found[which, :, k] = _held(known, below, bool(self._last[g][which, k]))
@@ -83,6 +91,15 @@ class Conditions:
         assert isinstance(leaf, PairLeaf)
         value = np.min(clearance[:, leaf.columns], axis=1)
         return value, value == 0.0, (leaf.below, leaf.released)
+
+
+def _frames_until(value: Floats, limit: Floats | float) -> float:
+    """Return in how many frames a value passes a limit from above, by its last two; inf if it does not come nearer."""
+    if len(value) < 2 or not np.isfinite(value[-2:]).all():
+        return UNKNOWN
+    above = value[-2:] - (limit if isinstance(limit, float) else limit[-2:])
+    nearer = float(above[0] - above[1])
+    return float(above[1]) / nearer if nearer > 0.0 and above[1] > 0.0 else np.inf
 
 
 def _held(known: Flags, value: Flags, last: bool) -> Flags:

@@ -16,7 +16,7 @@ from replay.guarding.plan import Plan, value_of
 from replay.kinematics.clock import Clock
 from replay.kinematics.linkage import Joint
 from replay.kinematics.motion import Motion
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Flags, Floats, Integers
 
 _AWAKE = (GuardState.ARMED, GuardState.RELEASING)
 
@@ -67,7 +67,7 @@ class Reaction:
         self._since: list[int | None] = [None] * len(self.guards)
         self._past: list[Episode] = []
         self._told, self._excess_from = -math.inf, [0.0] * len(self._joints)
-        self._rows: list[tuple[list[GuardState], list[bool], list[float]]] = []
+        self._rows: list[tuple[Integers, Flags, Floats]] = []
         self._follow_plan()
 
     def decide(self, first: int, seconds: Floats, told: Told, clearance: Floats) -> int:
@@ -81,7 +81,8 @@ class Reaction:
         """
         velocity = self.motion.states(seconds).velocities
         holds, stays = self._conditions.look(told, clearance, velocity, self._script_velocity(seconds))
-        for row, second in enumerate(seconds.tolist()):
+        quiet = self._quiet(seconds, holds)
+        for row, second in enumerate(seconds.tolist()[quiet:], start=quiet):
             looked = [self._look(g, first + row, second, holds[row, g], stays[row, g]) for g in range(len(self.guards))]
             changed = any(change for change, _ in looked)
             if changed:
@@ -89,7 +90,8 @@ class Reaction:
                 self._follow_plan()
             factors = self._plan.factors
             values = [value_of(factor.line(second), second) for factor in factors]
-            self._rows.append(([factor.state(second) for factor in factors], [shown for _, shown in looked], values))
+            state = np.array([[factor.state(second) for factor in factors]])
+            self._rows.append((state, np.array([[shown for _, shown in looked]]), np.array([values])))
             if changed:
                 self._conditions.keep(row + 1)
                 return row + 1
@@ -98,24 +100,43 @@ class Reaction:
 
     def columns(self, seconds: Floats) -> GuardColumns:
         """Return the columns of the frames decided since this was asked last, at times (n,) [s]."""
-        state, condition, factor = zip(*self._rows, strict=True)
+        state, condition, factor = (np.concatenate(parts) for parts in zip(*self._rows, strict=True))
         self._rows = []
         clocks = [clock.sample(seconds) for clock in self.motion.clocks]
         happenings = sorted(self._happenings(float(seconds[-1])), key=lambda item: item.time)
         self._told = float(seconds[-1])
         return GuardColumns(
-            state=np.array(state, dtype=np.uint8),
-            condition=np.array(condition, dtype=np.bool_),
-            factor=np.array(factor, dtype=np.float64),
+            state=state.astype(np.uint8),
+            condition=condition,
+            factor=factor,
             rate=np.stack([rate for _, rate in clocks], axis=1),
             script_time=np.stack([script for script, _ in clocks], axis=1),
             happenings=tuple(happenings),
         )
 
+    def soonest(self) -> float:
+        """Return in how many frames a condition may begin to hold, as far as the last ones tell; inf if none is near.
+
+        A guess, which no result depends on.
+        """
+        return self._conditions.soonest
+
     def episodes(self) -> tuple[Episode, ...]:
         """Return what guards did so far, by the time of the trigger."""
         current = [self._current(g) for g in range(len(self.guards))]
         return tuple(sorted((*self._past, *(item for item in current if item)), key=lambda item: item.trigger))
+
+    def _quiet(self, seconds: Floats, holds: Flags) -> int:
+        """Take the first frames, as long as all guards are armed and no condition holds; return how many these are."""
+        if not len(seconds) or any(f.state(seconds[0]) is not GuardState.ARMED for f in self._plan.factors):
+            return 0
+        held = np.flatnonzero(holds.any(axis=1))
+        count = int(held[0]) if len(held) else len(holds)
+        if count:
+            self._since = [None] * len(self.guards)
+            shape = holds[:count].shape
+            self._rows.append((np.zeros(shape, dtype=np.int64), holds[:count], np.ones(shape)))
+        return count
 
     def _look(self, g: int, frame: int, second: float, holds: bool, stays: bool) -> tuple[bool, bool]:
         """Take one frame of a guard; return whether it changes, and what its condition is taken for."""
