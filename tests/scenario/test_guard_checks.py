@@ -139,3 +139,10 @@ def test_a_guard_that_holds_all_that_could_end_its_condition_is_noted() -> None:
     ):
         told = [note.message for note in notes(load(guard)) if "guards.g.release" in note.message]
         assert bool(told) is noted, guard
+
+
+def test_guards_may_stand_in_an_included_part_beside_those_of_the_scenario() -> None:
+    part = b"guards: {shared: {when: {distance: tip, below: 10 cm}, stop: [cart]}}\n"
+    text = TEXT.format(guard=f"{{{TIP}, stop: [cart]}}", more="include: [rules_of_all.yaml]\n")
+    made = load_sources("rules.yaml", {"rules.yaml": text.encode(), "rules_of_all.yaml": part})
+    assert sorted(made.guards) == ["g", "shared"]
