@@ -9,13 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay.collision.columns import CollisionColumns
+from replay.guarding.columns import GuardColumns
 from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.scenario.layout import Layout
 from replay.sensing.kinds import KINDS, of_kind
+from replay.sensing.readings import KindReadings
 
 if TYPE_CHECKING:
     from replay.collision.pipeline import CollisionPipeline
+    from replay.guarded import Guarding
+    from replay.kinematics.linkage import LinkPoses
     from replay.kinematics.motion import Motion
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
@@ -50,6 +54,7 @@ class FrameBlock:
         link_poses: (n, L, 4, 4), T_world_link.
         collision: None when the scene tests no pair.
         readings: columns of the sensors by kind, also by name as `block.distance`, None when there are none.
+        guards: None when there are none.
     """
 
     layout: Layout
@@ -60,6 +65,7 @@ class FrameBlock:
     link_poses: Floats
     collision: CollisionColumns | None
     readings: Mapping[str, Any] = field(default_factory=dict)
+    guards: GuardColumns | None = None
 
     def __getattr__(self, kind: str) -> Any:
         return of_kind(self, kind, "readings")
@@ -90,22 +96,65 @@ class Simulation:
         self._proven = scene.model.collision.between == "proven"
         self.collision = collision_pipeline(scene, self._motion if self._proven else None) if scene.pairs else None
         self.suites: dict[str, Suite] = {
-            kind: KINDS[kind].suite(sensors, scene.targets, getattr(scene.model, kind), savings=scene.savings)
+            kind: KINDS[kind].suite(
+                sensors,
+                scene.targets,
+                getattr(scene.model, kind),
+                savings=scene.savings,
+                watched=scene.guards.watched.get(kind, frozenset()) if scene.guards else frozenset(),
+            )
             for kind, sensors in scene.sensors.items()
             if sensors
         }
+        self._readings = {
+            kind: KindReadings(KINDS[kind], suite, scene.signals.get(kind)) for kind, suite in self.suites.items()
+        }
+        self.guarding: Guarding | None = None
+        if scene.guards is not None:
+            from replay.guarded import Guarding
+
+            self.guarding = Guarding(scene, scene.guards, self._motion, self._readings)
+        self._remembers = bool(scene.signals) or scene.guards is not None
+        self._next = 0
 
     def __getattr__(self, kind: str) -> Any:
         return of_kind(self, kind, "suites")
 
     def block(self, first: int) -> FrameBlock:
-        """Return the block that begins at a frame; it depends on no other block."""
+        """Return the block that begins at a frame, the first of a block.
+
+        It depends on no other block; but where sensors have signal chains, or there are guards, those before it are
+        computed first, unless the last one asked for was the one before it.
+        """
+        if self._remembers and first != self._next:
+            for readings in self._readings.values():
+                readings.restart()
+            if self.guarding is not None:
+                self.guarding.restart()
+            for earlier in range(0, first, self._block_frames):
+                self._block(earlier)
+        return self._block(first)
+
+    def _block(self, first: int) -> FrameBlock:
         last = min(first + self._block_frames, self.scene.frames)
         lead = min(first, 1) if self._proven else 0  # what is between this block and the last one belongs to this one
+        guards: GuardColumns | None = None
+        known: dict[str, Any] = {}
+        placed: LinkPoses | None = None
+        if self.guarding is not None:
+            guards, known, placed = self.guarding.run(first, last)
+            self._motion = self.guarding.motion
+            if self.collision is not None:
+                self.collision.follow(self._motion)
         time = self.scene.time_ns(first - lead, last)
         states = self._motion.states(time / 1e9)
-        poses = self.scene.linkage.forward(states.positions, states.free_poses)
+        if placed is None:
+            poses = self.scene.linkage.forward(states.positions, states.free_poses)
+        else:  # what guards were decided by
+            head = self.scene.linkage.forward(states.positions[:lead], states.free_poses[:lead])
+            poses = head.joined([head, placed])
         shown = poses.slice(lead, len(time))
+        self._next = last
         return FrameBlock(
             layout=self.scene.layout,
             first=first,
@@ -114,8 +163,16 @@ class Simulation:
             joint_velocities=states.velocities[lead:],
             link_poses=shown.world,
             collision=self.collision.run(poses, lead=lead, time=time, first=first) if self.collision else None,
-            readings={kind: suite.run(shown) for kind, suite in self.suites.items()},
+            readings={
+                kind: known[kind] if kind in known else self._read(kind, shown, first) for kind in self._readings
+            },
+            guards=guards,
         )
+
+    def _read(self, kind: str, poses: LinkPoses, first: int) -> Any:
+        columns = self._readings[kind].read(poses, first)
+        self._readings[kind].keep(columns, first)
+        return columns
 
     def blocks(self) -> Iterator[FrameBlock]:
         """Yield all blocks in order."""

@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
+from replay.scenario.guard_outcomes import lines
 from replay.scenario.measures import Measure, Measures
 from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenMeasure, WrittenResult
+    from replay.guarding.outcome import GuardOutcomes
     from replay.scenario.first_frame import FirstFrame
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
@@ -78,6 +80,8 @@ class CaseResult:
         notes: what a reader should know about the scene.
         between_frames: contacts that no frame shows, and what is not proven, a line each.
         measures: its results as numbers: of its expectations, and extremes of its readings.
+        guards: what became of each trigger of a guard, see `guarding.outcome.Stop.as_json`; `reactions` says it in
+            lines for people.
         reused: taken from an earlier run.
         no_space: it failed because the disk is full.
     """
@@ -95,6 +99,8 @@ class CaseResult:
     notes: tuple[str, ...] = ()
     between_frames: tuple[str, ...] = ()
     measures: tuple[Measure, ...] = ()
+    guards: tuple[dict[str, Any], ...] = ()
+    reactions: tuple[str, ...] = ()
     reused: bool = False
     no_space: bool = False
 
@@ -113,6 +119,7 @@ class CaseResult:
             "notes": list(self.notes),
             "between_frames": list(self.between_frames),
             "results": [measure.as_json(self.name) for measure in self.measures],
+            **({"guards": list(self.guards), "reactions": list(self.reactions)} if self.guards else {}),
         }
 
     @staticmethod
@@ -129,6 +136,8 @@ class CaseResult:
             notes=tuple(values["notes"]),
             between_frames=tuple(values.get("between_frames", ())),
             measures=tuple(map(_measure, values.get("results", ()))),
+            guards=tuple(values.get("guards", ())),
+            reactions=tuple(values.get("reactions", ())),
             reused=True,
         )
 
@@ -150,8 +159,9 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
         check, unseen, measures = scene.expectation_check(), Unseen(scene.layout), Measures(scene.layout)
+        reactions = None if simulation.guarding is None else simulation.guarding.outcomes()
         first = FirstFrame(scenario, scene.layout)
-        blocks = _checked(simulation.blocks(), check, unseen, measures, first)
+        blocks = _checked(simulation.blocks(), check, unseen, measures, first, reactions)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -163,7 +173,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
             seconds=seconds,
             no_space=isinstance(error, NoSpaceError),
         )
-    outcomes = tuple(check.finish())
+    stops = [] if reactions is None else reactions.stops()
+    outcomes = tuple(check.finish(stops))
     return CaseResult(
         scenario.name,
         CaseStatus.PASSED if all(outcome.passed for outcome in outcomes) else CaseStatus.BROKEN,
@@ -175,6 +186,8 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         notes=(*scene.notes, *(n for suite in simulation.suites.values() for n in suite.notes()), *first.lines()),
         between_frames=unseen.lines(),
         measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results()),
+        guards=tuple(stop.as_json() for stop in stops),
+        reactions=tuple(lines(stops)),
     )
 
 
@@ -184,20 +197,27 @@ def describe(result: CaseResult) -> list[str]:
         return [f"{result.name}: {result.status.value}", *(f"  {line}" for line in result.error.splitlines())]
     pace = f" ({result.frames / result.seconds:.0f} a second)" if result.seconds > 0.0 else ""
     took = "reused" if result.reused else f"in {result.seconds:.1f} s{pace}"
-    lines = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
+    told = [f"{result.name}: {result.status.value}, {count(result.frames, 'frame')} {took}"]
     for outcome in result.outcomes:
-        lines.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
-    lines.extend(f"  {line}" for line in result.between_frames)
-    lines.extend(f"  note: {note}" for note in result.notes)
-    return lines
+        told.append(f"  {'ok  ' if outcome.passed else 'FAIL'} {outcome.expectation} ({outcome.detail})")
+    told.extend(f"  {line}" for line in (*result.reactions, *result.between_frames))
+    told.extend(f"  note: {note}" for note in result.notes)
+    return told
 
 
 def _checked(
-    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, measures: Measures, first: FirstFrame
+    blocks: Iterator[FrameBlock],
+    check: ExpectationCheck,
+    unseen: Unseen,
+    measures: Measures,
+    first: FirstFrame,
+    reactions: GuardOutcomes | None,
 ) -> Iterator[FrameBlock]:
     for block in blocks:
         first.update(block.collision, block.readings)
         measures.update(block.time, block.collision, block.readings)
+        if reactions is not None:
+            reactions.update(block.time, block.collision)
         check.update(block.time, block.collision, block.readings)
         unseen.update(block.collision)
         yield block

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, NotRequired
+from typing import Annotated, Any, NotRequired
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -49,6 +49,8 @@ class WrittenResult(TypedDict):
     notes: list[str]
     between_frames: NotRequired[list[str]]
     results: NotRequired[list[WrittenMeasure]]
+    guards: NotRequired[list[dict[str, Any]]]
+    reactions: NotRequired[list[str]]
 
 
 class WrittenNight(TypedDict):

@@ -96,6 +96,10 @@ class Intervals:
         self._depth = np.diff(self._first) - 1
         self._paths = [linkage.ancestors(link)[::-1] for link in range(len(linkage.links))]
 
+    def follow(self, motion: Motion) -> None:
+        """Go by another motion of the same links from here on."""
+        self._line = timeline(self._linkage, motion)
+
     def course(self, poses: LinkPoses, lead: int, time: Integers, first: int) -> Course:
         """Return how far bodies move in a block.
 

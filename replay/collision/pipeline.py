@@ -178,6 +178,11 @@ class CollisionPipeline:
         """The listed pairs, in the columns' order; empty if rules were given."""
         return self._pairs.listed
 
+    def follow(self, motion: Motion) -> None:
+        """Go by another motion from here on, if the pipeline has one."""
+        if self._intervals is not None:
+            self._intervals.follow(motion)
+
     def run(self, poses: LinkPoses, *, lead: int = 0, time: Integers | None = None, first: int = 0) -> CollisionColumns:
         """Return the columns of a block of n frames; they depend on no other block.
 

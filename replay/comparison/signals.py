@@ -20,6 +20,7 @@ import numpy as np
 
 from replay.collision.columns import Between, CollisionColumns
 from replay.comparison.moments import Moments, moments
+from replay.guarding.columns import GuardColumns
 from replay.numerics.arrays import Column
 from replay.numerics.columns import Columns, Field, Kind, components
 from replay.sensing.kinds import KINDS
@@ -111,10 +112,18 @@ def _all_groups(recording: Recording) -> Iterator[Group]:
             if field_.name == "level" and between:
                 known = moments(field_, layout.pairs, "/collision", recording.events, recording.time)
             yield Group(field_, signals, getattr(recording.collision, field_.name), (), known, between)
+    if recording.guards is not None:
+        for field_ in recording.guards.fields():
+            signals = _signals("/guards", field_, getattr(layout, field_.each))
+            yield Group(field_, signals, getattr(recording.guards, field_.name))
     for kind, columns in recording.readings.items():
-        topics = [KINDS[kind].topic(sensor) for sensor in layout.sensors[kind]]
+        sensors = layout.sensors[kind]
         for field_ in _gates_first(columns.present()):
-            yield from _of_sensors(topics, field_, getattr(columns, field_.name), layout)
+            having = [k for k, sensor in enumerate(sensors) if layout.has(kind, sensor, field_)]
+            topics = [KINDS[kind].topic(sensors[k]) for k in having]
+            values = getattr(columns, field_.name)
+            told = values if len(having) == len(sensors) else values[:, having]
+            yield from _of_sensors(topics, field_, told, layout)
 
 
 def silent_fields(recording: Recording) -> set[tuple[str, str]]:
@@ -162,6 +171,9 @@ def places(layout: Layout, topic: str, format: int) -> tuple[object, int]:
             return layout.links, (len(TRANSLATION_FIELDS) + 1) * len(layout.links)
         case "collision":
             return layout.pairs, len(_of_format(CollisionColumns, format)) * len(layout.pairs)
+        case "guards":
+            each = [len(getattr(layout, field_.each)) for field_ in GuardColumns.fields()]
+            return (layout.guards, layout.joints), sum(each)
     known = _of_format(KINDS[group].columns, format) if group in KINDS else []
     fields = [field_ for field_ in known if not field_.optional]
     meant = {names: getattr(layout, names) for field_ in fields for names in (field_.each, field_.names) if names}

@@ -137,6 +137,12 @@ class LinkPoses:
         """Return the poses of frames begin..end-1."""
         return LinkPoses(self.linkage, self.local[begin:end], self.world[begin:end])
 
+    @staticmethod
+    def joined(parts: Sequence[LinkPoses]) -> LinkPoses:
+        """Return poses of one linkage, one after another."""
+        local, world = (np.concatenate([getattr(part, name) for part in parts]) for name in ("local", "world"))
+        return LinkPoses(parts[0].linkage, local, world)
+
     def _chain(self, links: Sequence[int]) -> Floats:
         """Return the pose (n, 4, 4) of the first of some links, each the next one's child, in the last one's parent."""
         key = tuple(links)

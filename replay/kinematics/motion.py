@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from replay.errors import InvalidValue, MotionLimitError
+from replay.kinematics.clock import Clock
 from replay.kinematics.linkage import Joint, Linkage, Mimic
 from replay.kinematics.profiles import (
     Profile,
@@ -120,10 +121,12 @@ class Motion:
     Attributes:
         profiles: of the J joints, in the order of `Linkage.joint_names`.
         paths: of the K free joints, in the order of `Linkage.free_names`; None for one that stays where it is.
+        clocks: of the J joints; none where no script is ever slowed down. Free joints go by the time itself.
     """
 
     profiles: tuple[Profile, ...]
     paths: tuple[FreePath | None, ...]
+    clocks: tuple[Clock, ...] = ()
 
     def states(self, seconds: Floats) -> JointStates:
         """Return the joint states at times (n,) [s]; those at one time do not depend on the others."""
@@ -131,7 +134,12 @@ class Motion:
         positions = np.empty((n, len(self.profiles)))
         velocities = np.empty((n, len(self.profiles)))
         for k, profile in enumerate(self.profiles):
-            positions[:, k], velocities[:, k] = profile.sample(seconds)
+            if not self.clocks:
+                positions[:, k], velocities[:, k] = profile.sample(seconds)
+                continue
+            script, rate = self.clocks[k].sample(seconds)
+            positions[:, k], velocity = profile.sample(script)
+            velocities[:, k] = velocity * rate
         free_poses = transforms.identity(n, len(self.paths))
         for k, path in enumerate(self.paths):
             if path is not None:

@@ -101,6 +101,36 @@ class Profile:
                     (rising if moving > 0.0 else falling).append([start + a, start + b, *coefficients])
         return from_pieces(rising, self.before, self.after), from_pieces(falling, self.before, self.after)
 
+    def fastest(self, begin: float, end: float) -> float:
+        """Return the largest absolute velocity on [begin, end] [s]: at jumps and ends both one-sided values count."""
+        found = 0.0
+        first, last = np.searchsorted(self.end, begin, side="left"), np.searchsorted(self.start, end, side="right")
+        for k in range(int(first), int(last)):
+            start = float(self.start[k])
+            a, b = max(begin, start) - start, min(end, float(self.end[k])) - start
+            c = self.coefficients[k].tolist()
+            taus = [a, b]
+            if any(c[3:]):  # a velocity that is no line may be largest in between
+                turns = np.roots([20.0 * c[5], 12.0 * c[4], 6.0 * c[3], 2.0 * c[2]])
+                real = np.abs(turns.imag) <= 1e-9 * (1.0 + np.abs(turns.real))
+                taus += [tau for tau in turns.real[real].tolist() if a < tau < b]
+            for tau in taus:
+                velocity = c[1] + tau * (2.0 * c[2] + tau * (3.0 * c[3] + tau * (4.0 * c[4] + tau * 5.0 * c[5])))
+                found = max(found, abs(velocity))
+        return found
+
+    def length(self, begin: float, end: float) -> float:
+        """Return how far the joint goes on [begin, end] [s], there and back added up."""
+        times = {begin, end}
+        for k in np.flatnonzero((self.end > begin) & (self.start < end)).tolist():
+            start = float(self.start[k])
+            velocity = np.polynomial.Polynomial(self.coefficients[k]).deriv().trim()
+            turns = map(complex, velocity.roots()) if len(velocity.coef) > 1 else ()
+            inner = (root.real for root in turns if abs(root.imag) <= 1e-9 * (1.0 + abs(root.real)))
+            times |= {start, float(self.end[k]), *(start + tau for tau in inner)}
+        positions, _ = self.sample(np.array(sorted(time for time in times if begin <= time <= end)))
+        return float(np.sum(np.abs(np.diff(positions))))
+
     def extremes(self, derivative: int) -> list[tuple[float, float]]:
         """Return candidates (time, value) for the extremes of a derivative: piece ends and inner stationary points."""
         if not len(self.start):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, int64
 
+from replay.kinematics.clock import Clock
 from replay.kinematics.linkage import JointType, Linkage
 from replay.kinematics.motion import Motion
 from replay.numerics.arrays import Floats, Integers
@@ -34,7 +35,8 @@ class Timeline(NamedTuple):
     """L links of a linkage and the motion of their J scalar and K free joints.
 
     The pieces of scalar joint j are the rows `piece_first[j]:piece_first[j + 1]`, see `profiles.Profile`; the key
-    frames of free joint k the rows `key_first[k]:key_first[k + 1]`, none if it stays where it is.
+    frames of free joint k the rows `key_first[k]:key_first[k + 1]`, none if it stays where it is; the pieces of the
+    clock of scalar joint j, see `clock.Clock`, the rows `clock_first[j]:clock_first[j + 1]`, none if it goes by time.
     """
 
     parent: Integers  # (L,), -1 for a root
@@ -52,6 +54,11 @@ class Timeline(NamedTuple):
     key_time: Floats  # (k,) [s]
     key_xyz: Floats  # (k, 3) [m]
     key_quat: Floats  # (k, 4)
+    clock_first: Integers  # (J + 1,)
+    clock_start: Floats  # (c,) [s]
+    clock_script: Floats  # (c,) [s]
+    clock_rate: Floats  # (c,)
+    clock_ramp: Floats  # (c,) [1/s]
 
 
 TIMELINE_TYPE = record(
@@ -71,6 +78,11 @@ TIMELINE_TYPE = record(
     float64[::1],
     float64[:, ::1],
     float64[:, ::1],
+    int64[::1],
+    float64[::1],
+    float64[::1],
+    float64[::1],
+    float64[::1],
 )
 
 
@@ -80,6 +92,7 @@ def timeline(linkage: Linkage, motion: Motion) -> Timeline:
     index |= {name: k for k, name in enumerate(linkage.free_names)}
     links, profiles = linkage.links, motion.profiles
     keys = [path for path in motion.paths if path is not None]
+    clocks = motion.clocks or (Clock.steady(),) * len(profiles)
     return Timeline(
         parent=linkage.parents,
         kind=np.array([_KINDS[link.joint.type] for link in links], dtype=np.int64),
@@ -96,6 +109,11 @@ def timeline(linkage: Linkage, motion: Motion) -> Timeline:
         key_time=_joined([path.times for path in keys]),
         key_xyz=_joined([path.xyz for path in keys], 3),
         key_quat=_joined([path.quat_xyzw for path in keys], 4),
+        clock_first=_starts([len(clock.start) for clock in clocks]),
+        clock_start=_joined([clock.start for clock in clocks]),
+        clock_script=_joined([clock.script for clock in clocks]),
+        clock_rate=_joined([clock.rate for clock in clocks]),
+        clock_ramp=_joined([clock.ramp for clock in clocks]),
     )
 
 
@@ -129,15 +147,32 @@ def polynomial(c: Floats, tau: float) -> float:
 
 
 @leaf_kernel
-def position(line: Timeline, joint: int, t: float) -> float:
-    """Return the position [rad or m] of a scalar joint at time t [s]."""
+def script_time(line: Timeline, joint: int, t: float) -> float:
+    """Return how far the script of a scalar joint has come at time t [s], as `Clock.sample` computes it."""
+    begin, end = line.clock_first[joint], line.clock_first[joint + 1]
+    k = last_at_or_before(line.clock_start, begin, end, t)
+    if k < begin:
+        return float(t)
+    u = t - line.clock_start[k]
+    return float(line.clock_script[k] + u * (line.clock_rate[k] + 0.5 * line.clock_ramp[k] * u))
+
+
+@leaf_kernel
+def scripted(line: Timeline, joint: int, s: float) -> float:
+    """Return the position [rad or m] of a scalar joint at script time s [s]."""
     begin, end = line.piece_first[joint], line.piece_first[joint + 1]
-    if begin == end or t >= line.end[end - 1]:
+    if begin == end or s >= line.end[end - 1]:
         return float(line.after[joint])
-    k = last_at_or_before(line.start, begin, end, t)
+    k = last_at_or_before(line.start, begin, end, s)
     if k < begin:
         return float(line.before[joint])
-    return polynomial(line.coefficients[k], min(t, line.end[k]) - line.start[k])
+    return polynomial(line.coefficients[k], min(s, line.end[k]) - line.start[k])
+
+
+@leaf_kernel
+def position(line: Timeline, joint: int, t: float) -> float:
+    """Return the position [rad or m] of a scalar joint at time t [s]."""
+    return scripted(line, joint, script_time(line, joint, t))
 
 
 @leaf_kernel

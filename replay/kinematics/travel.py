@@ -23,7 +23,8 @@ from replay.kinematics.timeline import (
     half_turn,
     last_at_or_before,
     polynomial,
-    position,
+    script_time,
+    scripted,
     segment,
 )
 from replay.numerics.arrays import Floats
@@ -49,7 +50,45 @@ SHIFT, TURN = range(2)
 @leaf_kernel
 def joint_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
     """Write TRAVEL .. HIGHEST of a scalar joint over [t0, t1] [s]; `work` is (HALVINGS + 8, 8) scratch."""
-    q0, q1 = position(line, joint, t0), position(line, joint, t1)
+    s0, s1 = script_time(line, joint, t0), script_time(line, joint, t1)
+    _script_travel(line, joint, s0, s1, work, found)
+    if line.clock_first[joint] < line.clock_first[joint + 1] and s1 > s0:
+        _add_warp(line, joint, t0, t1, s0, s1, found)
+
+
+@leaf_kernel
+def _add_warp(line: Timeline, joint: int, t0: float, t1: float, s0: float, s1: float, found: Floats) -> None:
+    """Widen LOWEST and HIGHEST, which follow the chord over script time, to those that follow it over time.
+
+    With y = (s - s0) / (s1 - s0) they are bounds of q - q(s0) - y D; to those of x come the bounds of (y - x) D. On a
+    piece of the clock s lies between its Bernstein coefficients: its values at the ends, and where its tangents meet.
+    """
+    begin, end = line.clock_first[joint], line.clock_first[joint + 1]
+    low, high = 0.0, 0.0
+    for k in range(max(last_at_or_before(line.clock_start, begin, end, t0), begin - 1), end):
+        a = t0 if k < begin else max(t0, line.clock_start[k])
+        b = t1 if k + 1 == end else min(t1, line.clock_start[k + 1])
+        if not a < b:
+            continue
+        rate = 1.0 if k < begin else line.clock_rate[k] + line.clock_ramp[k] * (a - line.clock_start[k])
+        at_a, at_b = script_time(line, joint, a), script_time(line, joint, b)
+        for i in range(3):
+            s = at_a if i == 0 else at_b if i == 2 else at_a + 0.5 * rate * (b - a)
+            apart = (s - s0) / (s1 - s0) - (0.5 * (a + b) - t0 + (0.5 * i - 0.5) * (b - a)) / (t1 - t0)
+            low, high = min(low, apart), max(high, apart)
+    change = abs(found[CHANGE])
+    # of y and x, that of s against the interval it is divided by
+    rounding = ROUNDING * (1.0 + (abs(s1) + abs(t1)) / (s1 - s0))
+    least, most = (low, high) if found[CHANGE] > 0.0 else (-high, -low)
+    found[LOWEST] += change * (least - rounding)
+    found[HIGHEST] += change * (most + rounding)
+
+
+@leaf_kernel
+def _script_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
+    """Write TRAVEL .. HIGHEST over [t0, t1] [s] of script time, the bounds as they follow the chord over it."""
+    q0, q1 = scripted(line, joint, t0), scripted(line, joint, t1)
+    slowed = line.clock_first[joint] < line.clock_first[joint + 1]
     begin, end = line.piece_first[joint], line.piece_first[joint + 1]
     total, rounding, last = 0.0, 0.0, q0
     low, high = 0.0, 0.0
@@ -74,6 +113,8 @@ def joint_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats,
         size, power = 0.0, 1.0
         for i in range(6):
             size += abs(c[i]) * power
+            if slowed and i < 5:  # script time is rounded as well
+                size += (i + 1) * abs(c[i + 1]) * power * abs(t1)
             power *= b - s
         rounding = max(rounding, ROUNDING * (size + abs(q0) + abs(q1)))
         total += _variation(c, a - s, b - s, size, work)

@@ -71,6 +71,7 @@ ANGULAR_ACCELERATION: Final = Dimension("an angular acceleration", "rad/s^2", _p
 CAPACITANCE: Final = Dimension("a capacitance", "F", _metric("F", uF=-6, nF=-9, pF=-12, fF=-15), "10 pF")
 PERMITTIVITY: Final = Dimension("a permittivity", "F/m", _metric("F/m", **{"nF/m": -9, "pF/m": -12}), "8.854 pF/m")
 VOLTAGE: Final = Dimension("a voltage", "V", _metric("V", mV=-3, kV=3), "2.5 V")
+SHARE: Final = Dimension("a share", "-", {"%": Fraction(1, 100)}, "5 %")
 NUMBER: Final = Dimension("a number", "-", {}, "1")
 
 DIMENSIONS: Final = (
@@ -85,6 +86,7 @@ DIMENSIONS: Final = (
     CAPACITANCE,
     PERMITTIVITY,
     VOLTAGE,
+    SHARE,
 )
 DIMENSION_OF: Final = {unit: dimension for dimension in DIMENSIONS for unit in dimension.units}
 
@@ -286,6 +288,7 @@ Angle = Annotated[float, Quantity("Angle", ANGLE, at_least=-_FAR, at_most=_FAR)]
 Aperture = Annotated[float, Quantity("Aperture", ANGLE, above=0.0, at_most=FULL_TURN)]
 Time = Annotated[float, Quantity("Time", TIME, at_least=0.0, at_most=1e9)]
 Duration = Annotated[Fraction, Quantity("Duration", TIME, at_least=0.0, at_most=1e9, exact=True)]
+Delay = Annotated[Fraction, Quantity("Delay", TIME, at_least=0.0, at_most=1e9, exact=True)]
 Rate = Annotated[Fraction, Quantity("Rate", FREQUENCY, above=0.0, at_most=1e9, exact=True)]
 MaxVelocity = Annotated[float, Quantity("MaxVelocity", VELOCITY, at_least=_SMALL, infinite=True)]
 MaxAngularVelocity = Annotated[float, Quantity("MaxAngularVelocity", ANGULAR_VELOCITY, at_least=_SMALL, infinite=True)]
@@ -302,6 +305,7 @@ Earth = Annotated[
 Permittivity = Annotated[float, Quantity("Permittivity", PERMITTIVITY, at_least=1e-18, at_most=1.0)]
 Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1e6)]
 Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]
+Probability = Annotated[float, Quantity("Probability", SHARE, at_least=0.0, at_most=1.0)]
 Share = Annotated[float, Quantity("Share", NUMBER, at_least=1e-3, at_most=1.0)]
 Scale = Annotated[float, Quantity("Scale", NUMBER, at_least=1e-9, at_most=1e9)]
 AxisScale = Annotated[float, Quantity("AxisScale", NUMBER, at_least=-1e9, at_most=1e9)]

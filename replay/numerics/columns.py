@@ -59,6 +59,7 @@ class Field:
         most: largest value of one that counts or is a state; what its type or `states` allow when left out.
         nothing: the value when there is nothing to tell; of `Columns` it follows from the type unless it is a state.
         since: version of the recording format that first holds it; the column of an older recording is None.
+        signal: it is there only of sensors with a signal chain, see `Layout.signals`; NaN of the others.
         optional: whether the column may be None; it follows from its type. A sensor's that is None is not recorded.
     """
 
@@ -81,6 +82,7 @@ class Field:
     most: int = 0
     nothing: float = np.nan
     since: int = 1
+    signal: bool = False
     optional: bool = False
 
 

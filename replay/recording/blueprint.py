@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from replay.collision.columns import CollisionColumns
+from replay.guarding.columns import GuardColumns
 from replay.numerics.arrays import Floats
 from replay.numerics.columns import Field
 from replay.sensing.kind import SensorKind
@@ -16,6 +17,7 @@ from replay.sensing.kinds import KINDS
 SCENE = "scene"
 CLEARANCE = "clearance"
 JOINTS = "joints"
+CLOCKS = "clocks"
 EVENTS = "events"
 SCENARIO = "scenario"
 TIMELINE = "time"
@@ -32,6 +34,7 @@ CHARTED = {kind.name: _charted(kind) for kind in KINDS.values()}
 CHARTS = {
     **{chart: field.chart for fields in CHARTED.values() for chart, field in fields.items()},
     CLEARANCE: next(field.chart for field in CollisionColumns.fields() if field.chart),
+    CLOCKS: next(field.chart for field in GuardColumns.fields() if field.chart),
     JOINTS: "Joint positions [rad, m]",
 }
 """Titles of all charts, in the order in which they are shown."""

@@ -6,6 +6,7 @@ known of anything else is that a frame shows it and the frame before does not.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,14 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns, Crossings, Level
+from replay.guarding.columns import EVENTS as GUARD_EVENTS
+from replay.guarding.columns import EXCESS, Happening
 from replay.numerics.arrays import Flags, Integers
 from replay.sensing.kinds import KINDS
 from replay.simulation import FrameBlock, Layout
 
+_GUARDS = "/guards"
 _FIELDS = [*CollisionColumns.fields(), *(field for kind in KINDS.values() for field in kind.columns.fields())]
-SEVERITY = {event: severity for field in _FIELDS for event, severity in field.events.items()}
+SEVERITY = {event: severity for field in _FIELDS for event, severity in field.events.items()} | GUARD_EVENTS
 """Foxglove's log level of the beginning of each kind of event; the end of any is information (2)."""
 _INFORMATION = 2
+_EXACT = 1e-3
+"""Moments of guards this near a nanosecond [ns] are that one: what seconds lose of it."""
 _LEVELS = {"bounds": Level.BOUNDS, "contact": Level.CONTACT}
 """The kinds of events that crossings tell of, and the level that begins or ends."""
 
@@ -33,9 +39,10 @@ class Transition:
 
     Attributes:
         kind: "bounds" (the bounding volumes of a pair meet, whether or not the shapes do), "contact", "undecided", or
-            what the columns of a sensor kind call it, such as "detection".
+            what the columns of a sensor kind call it, such as "detection"; of a guard "trigger", "hold" or "release",
+            and "excess acceleration" of a joint that guards slow down.
         begins: whether it begins; else it ends.
-        subject: the pair or the sensor.
+        subject: the pair, the sensor, the guard or the joint.
         source: the topic that says so.
     """
 
@@ -218,7 +225,9 @@ class EventFinder:
         crossings = Crossings.none() if block.collision is None else block.collision.crossings
         before = np.concatenate([[min(self._before, int(block.time[0]))], block.time[:-1]])
         self._before = int(block.time[-1])
-        columns = [(np.zeros(0, dtype=np.int64),) * 4]  # number, frame in the block, time, earliest
+        columns: list[tuple[Integers, ...]] = [
+            (np.zeros(0, dtype=np.int64),) * 4
+        ]  # number, frame in the block, time, earliest
         for kind, state in _states(block):
             changed = np.empty(state.shape, dtype=np.bool_)
             np.not_equal(state[0], self._last[kind], out=changed[0])
@@ -235,11 +244,23 @@ class EventFinder:
                 frame, subject = found // state.shape[1], found % state.shape[1]
                 number = self._first[kind] + 2 * subject + state.reshape(-1)[found]
                 columns.append((number, frame, block.time[frame], before[frame]))
+        if block.guards is not None and block.guards.happenings:
+            columns.append(self._of_guards(block, block.guards.happenings))
         number, frame, time, earliest = (np.concatenate(parts) for parts in zip(*columns, strict=True))
         order = np.lexsort((number // 2, time))  # what begins and ends at one time stays in the order of its crossings
         numbers, code = np.unique(number, return_inverse=True)
         transitions = tuple(self._transition(number) for number in numbers.tolist())
         return Events(time[order], block.first + frame[order], code[order], transitions, earliest[order])
+
+    def _of_guards(self, block: FrameBlock, happenings: Sequence[Happening]) -> tuple[Integers, ...]:
+        """Return number, frame in the block, time and earliest time of what happened to guards."""
+        known = {(kind, subject): at for at, (kind, subject, _) in enumerate(self._subjects)}
+        number = [2 * known[item.kind, item.subject] + item.begins for item in happenings]
+        latest = np.array([math.ceil(1e9 * item.time - _EXACT) for item in happenings], dtype=np.int64)
+        latest = np.clip(latest, 0, block.time[-1])
+        earliest = np.array([math.floor(1e9 * item.time + _EXACT) for item in happenings], dtype=np.int64)
+        frame: Integers = np.searchsorted(block.time, latest)
+        return np.array(number, dtype=np.int64), frame, latest, np.minimum(earliest, latest)
 
     def _transition(self, number: int) -> Transition:
         kind, subject, source = self._subjects[number // 2]
@@ -256,6 +277,10 @@ def _subjects(layout: Layout) -> Iterator[tuple[str, str, str]]:
         for field in fields:
             for event in field.events:
                 yield from ((event, name, topic) for name, topic in topics.items())
+    if layout.guards:
+        for event in GUARD_EVENTS:
+            names = layout.joints if event == EXCESS else layout.guards
+            yield from ((event, name, _GUARDS) for name in names)
 
 
 def _states(block: FrameBlock) -> Iterator[tuple[str, Flags]]:

@@ -54,10 +54,18 @@ def tables(recording: Recording) -> dict[str, Table]:
             for field in recording.collision.present():
                 values = getattr(recording.collision, field.name)[:, pair]
                 _add(result["/collision"], f"{name} {field.label}", field, values, layout)
+    if recording.guards is not None:
+        result["/guards"] = dict(time)
+        for field in recording.guards.fields():
+            for k, name in enumerate(getattr(layout, field.each)):
+                values = getattr(recording.guards, field.name)[:, k]
+                _add(result["/guards"], f"{name} {field.label}", field, values, layout)
     for kind, columns in recording.readings.items():
         for sensor, name in enumerate(layout.sensors[kind]):
             table = result[KINDS[kind].topic(name)] = dict(time)
             for field in columns.present():
+                if not layout.has(kind, name, field):
+                    continue
                 values = getattr(columns, field.name)[:, sensor]
                 for k, each in enumerate(getattr(layout, field.each) if field.each else ()):
                     _add(table, f"{each} {field.label}", field, values[:, k], layout)

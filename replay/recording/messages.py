@@ -13,6 +13,7 @@ from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorSet
 
 from replay.collision.columns import CollisionColumns
+from replay.guarding.columns import GuardColumns
 from replay.logs.mcap_records import Schema
 from replay.logs.protobuf import descriptor_set
 from replay.numerics.columns import Columns
@@ -20,6 +21,7 @@ from replay.recording.made_types import message_file, names_file
 from replay.sensing.kinds import KINDS
 
 COLLISION = "replay.CollisionStates"
+GUARDS = "replay.GuardStates"
 JOINTS = "foxglove.JointStates"
 TRANSFORMS = "foxglove.FrameTransforms"
 SCENE = "foxglove.SceneUpdate"
@@ -47,7 +49,7 @@ def schema(name: str) -> Schema:
 
 @functools.cache
 def _own_types() -> Any:
-    types: dict[str, type[Columns]] = {COLLISION: CollisionColumns}
+    types: dict[str, type[Columns]] = {COLLISION: CollisionColumns, GUARDS: GuardColumns}
     types |= {kind.message: kind.columns for kind in KINDS.values()}
     pool = descriptor_pool.DescriptorPool()
     for name, columns in types.items():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns
 from replay.errors import ForeignLogError, InvalidValue, RecordingError
+from replay.guarding.columns import GuardColumns
 from replay.logs.columns import Topic, read_topics
 from replay.logs.loss import Loss
 from replay.logs.mcap_reader import McapLog
@@ -51,6 +52,7 @@ class Recording:
         link_quaternions: (F, L, 4), rotation of T_world_link, xyzw, w >= 0.
         collision: None when the scene tests no pair.
         readings: columns of the sensors by kind, also by name as `recording.distance`, None when there are none.
+        guards: None when there are none; `happenings` are empty: the events tell them.
         events: in the order of time, a sequence of `Event`.
         files: the scenario and every file that it needs, by name.
         loss: what a salvaged file has lost, else None.
@@ -70,6 +72,7 @@ class Recording:
     loss: Loss | None
     lost_frames: int
     readings: Mapping[str, Any] = field(default_factory=dict)
+    guards: GuardColumns | None = None
 
     def __getattr__(self, kind: str) -> Any:
         return of_kind(self, kind, "readings")
@@ -142,7 +145,7 @@ def read_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
 
 def own_topics(layout: Layout) -> set[str]:
     """Return the topics that a recording may have; those that another tool has added to it are none of them."""
-    return {FRAMES, "/tf", "/scene", LAYOUT, EVENTS, "/collision", *layout.topics()}
+    return {FRAMES, "/tf", "/scene", LAYOUT, EVENTS, "/collision", "/guards", *layout.topics()}
 
 
 class _Assembly:
@@ -193,6 +196,7 @@ class _Assembly:
             link_quaternions=quaternions,
             collision=self._collision(),
             readings=self._readings(),
+            guards=self._guards(),
             events=self._events(),
             files=read_files(self._log, self._provenance),
             loss=self._log.loss,
@@ -201,7 +205,7 @@ class _Assembly:
 
     def _check_topics(self, names: set[str]) -> None:
         """Refuse a file without the topics that every recording has, or with some sensors of a kind and not all."""
-        needed = {FRAMES, "/tf", EVENTS}
+        needed = {FRAMES, "/tf", EVENTS, *(["/guards"] if self._provenance.layout.guards else [])}
         for kind, sensors in self._provenance.layout.sensors.items():
             topics = {KINDS[kind].topic(name) for name in sensors}
             needed |= topics if topics & names else set()
@@ -284,19 +288,35 @@ class _Assembly:
         columns: dict[str, Any] = {field.name: self._field(topic, field) for field in CollisionColumns.fields()}
         return CollisionColumns(**columns)
 
+    def _guards(self) -> GuardColumns | None:
+        if not self._all.guards or "/guards" not in self._topics:
+            return None
+        topic, names = self._topic("/guards"), self._all  # clocks of joints, also where their positions are not read
+        found: dict[str, Any] = {
+            field.name: self._column(topic, field.name, field, len(getattr(names, field.each)))
+            for field in GuardColumns.fields()
+        }
+        return GuardColumns(**found)
+
     def _readings(self) -> dict[str, Any]:
         found = {}
         for kind, names in self._layout.sensors.items():
             topics = [self._topics[topic] for topic in map(KINDS[kind].topic, names) if topic in self._topics]
             if topics:
                 columns = KINDS[kind].columns
-                found[kind] = columns(**{field.name: self._of_sensors(topics, field) for field in columns.fields()})
+                read = [name for name in names if KINDS[kind].topic(name) in self._topics]
+                values = {}
+                for field in columns.fields():
+                    having = [self._layout.has(kind, name, field) for name in read]
+                    values[field.name] = self._of_sensors(topics, field, having)
+                found[kind] = columns(**values)
         return found
 
-    def _of_sensors(self, topics: list[Topic], field: Field) -> NDArray[Any] | None:
+    def _of_sensors(self, topics: list[Topic], field: Field, having: list[bool]) -> NDArray[Any] | None:
         if field.optional and not any(field.name in topic.columns for topic in topics):
-            return None  # its method has no such column
-        values = [self._field(topic, field) for topic in topics]
+            return None  # its method has no such column, or no sensor a signal
+        nothing = np.full(len(self._frames), field.nothing, dtype=field.type)
+        values = [self._field(topic, field) if has else nothing for topic, has in zip(topics, having, strict=True)]
         present = [value for value in values if value is not None]
         return np.stack(present, axis=1) if present else None
 
@@ -317,9 +337,14 @@ def _reduced(layout: Layout, topics: Collection[str]) -> Layout:
         joints=layout.joints if joints else (),
         joint_units=layout.joint_units if joints else (),
         pairs=layout.pairs if "/collision" in topics else (),
+        guards=layout.guards if "/guards" in topics else (),
         sensors={
             kind: tuple(name for name in names if KINDS[kind].topic(name) in topics)
             for kind, names in layout.sensors.items()
+        },
+        signals={
+            kind: tuple(name for name in names if KINDS[kind].topic(name) in topics)
+            for kind, names in layout.signals.items()
         },
     )
 

@@ -81,11 +81,13 @@ class RerunWriter:
         for kind, columns in block.readings.items():
             for chart, field in blueprint.CHARTED[kind].items():
                 values = getattr(columns, field.name)
-                self._curves(block, chart, self._layout.sensors[kind], values, np.isfinite(values))
+                if values is not None:
+                    self._curves(block, chart, self._layout.sensors[kind], values, np.isfinite(values))
             for field in columns.fields():
                 if field.beam:
                     self._beams(block, kind, getattr(columns, field.name))
         self._clearance(block)
+        self._guards(block)
         titles = [f"{name} [{unit}]" for name, unit in zip(self._layout.joints, self._layout.joint_units, strict=True)]
         everywhere = np.ones(block.joint_positions.shape, dtype=np.bool_)
         self._curves(block, blueprint.JOINTS, self._layout.joints, block.joint_positions, everywhere, titles)
@@ -209,6 +211,23 @@ class RerunWriter:
         if block.collision is not None:
             columns = block.collision
             self._curves(block, blueprint.CLEARANCE, self._layout.pairs, columns.clearance, columns.evaluated)
+
+    def _guards(self, block: FrameBlock) -> None:
+        """Append the clocks of joints that are slowed down, and the thresholds at which that begins."""
+        if block.guards is None:
+            return
+        slowed = [k for k, name in enumerate(self._layout.joints) if name in self._scene.slowed]
+        rate = block.guards.rate[:, slowed]
+        names = [self._layout.joints[k] for k in slowed]
+        self._curves(block, blueprint.CLOCKS, names, rate, np.ones(rate.shape, dtype=np.bool_))
+        ends = np.zeros(len(block.time), dtype=np.bool_)
+        ends[[0, -1]] = True
+        for chart, name, value in self._scene.thresholds:
+            path = entity(chart, name)
+            if (chart, name) not in self._named:
+                log_curve(self._chunks, path, name, self._number_of(chart, name))
+                self._named.add((chart, name))
+            self._send(block, ends, path, column("Scalars", "scalars", np.full(int(ends.sum()), value), 1))
 
     def _curves(
         self,

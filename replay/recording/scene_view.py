@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from replay.guarding.guard import PairLeaf, SensorLeaf, leaves
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.kept import kept
+from replay.recording.blueprint import CHARTED, CLEARANCE
 from replay.sensing.kind import Color, Drawing
 from replay.sensing.kinds import KINDS
 
@@ -59,6 +61,8 @@ class SceneView:
         name, description: of the scenario; the description may be several lines of Markdown.
         texts: the scenario's own text files, by name.
         links: L names.
+        thresholds: lines in charts: the chart, what the line is called, and where it is.
+        slowed: names of the joints that guards slow down.
         bodies, sensors: see there.
     """
 
@@ -68,6 +72,8 @@ class SceneView:
     bodies: tuple[BodyView, ...]
     sensors: tuple[SensorView, ...] = ()
     texts: Mapping[str, str] = field(default_factory=dict)
+    thresholds: tuple[tuple[str, str, float], ...] = ()
+    slowed: tuple[str, ...] = ()
 
     @functools.cached_property
     def meshes(self) -> Meshes:
@@ -139,4 +145,24 @@ def view(scene: Scene) -> SceneView:
             for name, data in scenario.sources.items()
             if name.endswith((".yaml", ".yml"))
         },
+        thresholds=tuple(_thresholds(scene)),
+        slowed=tuple(sorted({joint for guard in scenario.guards.values() for joint in guard.joints})),
     )
+
+
+def _thresholds(scene: Scene) -> Iterator[tuple[str, str, float]]:
+    """Yield the thresholds of sensors and clearances at which guards act."""
+    made = scene.guards.guards if scene.guards is not None else ()
+    for guard in made:
+        for leaf in leaves(guard.when):
+            if isinstance(leaf, PairLeaf) and leaf.below > 0.0:
+                yield CLEARANCE, f"{guard.name} acts", leaf.below
+            if isinstance(leaf, SensorLeaf):
+                name, output = scene.layout.sensors[leaf.kind][leaf.column], KINDS[leaf.kind].output
+                assert output is not None
+                charts = {field.name: chart for chart, field in CHARTED[leaf.kind].items()}
+                measured = name in scene.layout.signals.get(leaf.kind, ())
+                place = (
+                    leaf.below if measured else output.charted(scene.scenario.sensors.of(leaf.kind)[name], leaf.below)
+                )
+                yield charts["measured"] if measured else leaf.kind, f"{guard.name} acts on {name}", place

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from replay.collision.columns import CollisionColumns
+from replay.guarding.columns import GuardColumns
 from replay.kinematics.linkage import WORLD
 from replay.logs.mcap_writer import MessageRows, rows_of_chunk
 from replay.logs.wire import MessageShape, Slot, shape_of
@@ -82,11 +83,14 @@ def frame_topics(layout: Layout, *, collision: bool, kinds: Mapping[str, Collect
     if collision:
         example = _example(CollisionColumns.fields(), layout)
         yield _topic("/collision", messages.COLLISION, example, _collision)
+    if layout.guards:
+        yield _topic("/guards", messages.GUARDS, _example(GuardColumns.fields(), layout), _guards)
     for kind in KINDS.values():
         if kind.name in kinds:
-            example = _example(kinds[kind.name], layout)
             for index, name in enumerate(layout.sensors[kind.name]):
-                yield _topic(kind.topic(name), kind.message, example, _reading(kind.name, index))
+                fields = [field for field in kinds[kind.name] if layout.has(kind.name, name, field)]
+                topic, example = kind.topic(name), _example(fields, layout)
+                yield _topic(topic, kind.message, example, _reading(kind.name, index, fields))
     yield _topic("/joint_states", messages.JOINTS, _joints_example(layout), _joints)
 
 
@@ -174,6 +178,11 @@ def _collision(block: FrameBlock) -> Columns:
     return {field.name: _values(block, block.collision, field) for field in block.collision.fields()}
 
 
+def _guards(block: FrameBlock) -> Columns:
+    assert block.guards is not None
+    return {field.name: getattr(block.guards, field.name) for field in block.guards.fields()}
+
+
 def _values(block: FrameBlock, columns: Any, field: Field) -> Column:
     """Return a column, or one that tells nothing in place of one that an older recording did not have."""
     values: Column | None = getattr(columns, field.name)
@@ -187,10 +196,10 @@ def _values(block: FrameBlock, columns: Any, field: Field) -> Column:
     return np.broadcast_to(np.array(field.nothing, dtype=field.type), shape)
 
 
-def _reading(kind: str, sensor: int) -> Callable[[FrameBlock], Columns]:
+def _reading(kind: str, sensor: int, fields: Collection[Field]) -> Callable[[FrameBlock], Columns]:
     def columns(block: FrameBlock) -> Columns:
         found: Columns = {}
-        for field in block.readings[kind].present():
+        for field in fields:
             found |= components(field, getattr(block.readings[kind], field.name)[:, sensor])
         return found
 

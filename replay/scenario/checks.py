@@ -15,12 +15,12 @@ from replay.language.units import (
     Dimensioned,
 )
 from replay.scenario.expectations import PairExpectation
-from replay.scenario.names import SCALAR_JOINTS, JointName, Names, ShapeName
-from replay.scenario.problems import Path, did_you_mean
+from replay.scenario.guard_checks import guard_findings
+from replay.scenario.names import SCALAR_JOINTS, JointName, Names
+from replay.scenario.pair_checks import known_clearance, matching_patterns, tested_pairs
+from replay.scenario.problems import Finding, Path, did_you_mean
 from replay.sensing.kinds import KINDS
-
-Finding = tuple[Path, str]
-"""The path of a value, and the rule it breaks."""
+from replay.sensing.signal.part import sampling_problems
 
 
 def check(names: Names) -> Iterator[Finding]:
@@ -30,6 +30,7 @@ def check(names: Names) -> Iterator[Finding]:
     yield from _sensors(names)
     yield from _disabled(names)
     yield from _expectations(names)
+    yield from guard_findings(names)
 
 
 def _links(names: Names) -> Iterator[Finding]:
@@ -227,6 +228,9 @@ def _sensors(names: Names) -> Iterator[Finding]:
                 if not names.links_matching(pattern):
                     rule = did_you_mean(pattern, names.parents, what="links are")
                     yield (*path, "ignore", index), f"matches no link; {rule}"
+            signal = getattr(sensor, "signal", None)
+            if signal is not None and names.rate is not None:
+                yield from (((*path, "signal", key), rule) for key, rule in sampling_problems(signal, names.rate))
             own = [shape.name for shape in names.shapes if shape.link == sensor.link]
             for place, shape in KINDS[kind].own_shapes(sensor).items():
                 if shape not in own:
@@ -239,68 +243,27 @@ def _disabled(names: Names) -> Iterator[Finding]:
         if entry is None:
             continue
         path: Path = ("collision", "disable", index, "pair")
-        found = list(_patterns(names, path, entry.pair))
+        found = list(matching_patterns(names, path, entry.pair))
         yield from found
         sides = [names.shapes_matching(pattern) for pattern in entry.pair]
         if not found and not any(a.link != b.link for a in sides[0] for b in sides[1]):
             yield path, f"{list(entry.pair)}: these match no two shapes on different links"
 
 
-def _patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
-    for side, pattern in enumerate(pair):
-        if not names.links_matching(pattern) and not names.shapes_matching(pattern):
-            known = [*names.parents, *(shape.full for shape in names.shapes)]
-            yield (*path, side), f"matches no link and no shape; {did_you_mean(pattern, known)}"
-
-
 def _expectations(names: Names) -> Iterator[Finding]:
     for index, expected in enumerate(names.expect):
         path: Path = ("expect", index)
         if isinstance(expected, PairExpectation):
-            found = list(_patterns(names, (*path, "pair"), expected.pair))
-            yield from found or _tested(names, (*path, "pair"), expected.pair)
+            found = list(matching_patterns(names, (*path, "pair"), expected.pair))
+            yield from found or tested_pairs(names, (*path, "pair"), expected.pair)
             if expected.clearance is not None:
-                yield from _clearance(names, (*path, "clearance", "min"), expected.clearance.min)
+                yield from known_clearance(names, (*path, "clearance", "min"), expected.clearance.min)
         for kind, sensors in names.sensors.items():
             if isinstance(expected, KINDS[kind].expectation) and getattr(expected, kind) not in sensors:
                 rule = did_you_mean(getattr(expected, kind), sensors, what=f"{kind} sensors are")
                 yield (*path, kind), f"is no {kind} sensor; {rule}"
-
-
-def _tested(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
-    """Find that two patterns match no pair of shapes that is tested, and why."""
-    if not names.tests_pairs:
-        yield path, f"{list(pair)}: nothing is tested, since collision.pairs is none"
-        return
-    reason = "they match no two shapes on different links"
-    for a in names.shapes_matching(pair[0]):
-        for b in names.shapes_matching(pair[1]):
-            hindrance = _hindrance(names, a, b)
-            if hindrance is None:
-                return
-            reason = hindrance or reason
-    yield path, f"{list(pair)}: no pair of shapes that these match is tested: {reason}"
-
-
-def _hindrance(names: Names, a: ShapeName, b: ShapeName) -> str | None:
-    """Return why a pair is not tested; empty for shapes of one link, None when it is tested."""
-    if a.link == b.link:
-        return ""
-    if not (a.collides and b.collides):
-        return f"{(b if a.collides else a).full} has collide: false"
-    if names.parents.get(a.link) == b.link or names.parents.get(b.link) == a.link:
-        return f"links {a.link!r} and {b.link!r} are joined by a joint"
-    for index, first, second in names.disabled:
-        if (a.full in first and b.full in second) or (b.full in first and a.full in second):
-            return f"collision.disable[{index}] leaves it out"
-    return None
-
-
-def _clearance(names: Names, path: Path, least: float) -> Iterator[Finding]:
-    if names.model is None or names.margin is None:
-        return
-    if names.model.collision.clearance == "never":
-        yield path, "cannot be judged, since model.collision.clearance is never; write near or always"
-    elif names.model.collision.clearance == "near" and least > names.margin:
-        margin = f"collision.margin {names.margin:.6g} m, up to which clearances are computed"
-        yield path, f"is above {margin}; raise the margin, or write model.collision.clearance: always"
+            elif isinstance(expected, KINDS[kind].expectation) and getattr(expected, "measured", None) is not None:
+                sensor = sensors[getattr(expected, kind)]
+                if sensor is not None and sensor.signal is None:
+                    rule = f"is measured by no signal chain; give sensors.{kind}.{getattr(expected, kind)} a signal"
+                    yield (*path, "measured"), rule

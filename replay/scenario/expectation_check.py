@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.collision.columns import CollisionColumns, Level
+from replay.guarding.outcome import Stop
+from replay.guarding.part import GuardExpectation
 from replay.language.fields import Part
 from replay.language.node import Place
 from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import BetweenPart, PairExpectation
+from replay.scenario.guard_outcomes import judge
 from replay.scenario.layout import Layout
 from replay.scenario.measures import Measure
 from replay.scenario.meetings import Clearances, Meetings, Seen, seen
@@ -61,6 +64,14 @@ class _Check:
     state: Tally
 
 
+@dataclass
+class _GuardCheck:
+    """An expectation of a guard, judged in the end."""
+
+    path: tuple[str | int, ...]
+    expected: GuardExpectation
+
+
 class ExpectationCheck:
     """Follows expectations over all frames.
 
@@ -85,8 +96,11 @@ class ExpectationCheck:
         self._clearance = clearance
         self._margin = margin
         self._provenance = provenance or ScenarioProvenance()
-        self._checks: list[_Check] = []
+        self._checks: list[_Check | _GuardCheck] = []
         for index, expectation in enumerate(expectations):
+            if isinstance(expectation, GuardExpectation):
+                self._checks.append(_GuardCheck(("expect", index), expectation))
+                continue
             if isinstance(expectation, PairExpectation):
                 self._add_pairs(("expect", index), expectation)
                 continue
@@ -99,12 +113,17 @@ class ExpectationCheck:
         """Take the results of the next n frames, at times (n,) [ns]: of pairs, and of each kind of sensor by name."""
         block = _Block(collision, readings)
         for check in self._checks:
-            check.state.update(time_ns, check.take(block))
+            if isinstance(check, _Check):
+                check.state.update(time_ns, check.take(block))
 
-    def finish(self) -> list[Outcome]:
-        """Return what became of each line, in the order they are written."""
+    def finish(self, stops: Sequence[Stop] = ()) -> list[Outcome]:
+        """Return what became of each line, in the order they are written; `stops` of the guards of the run."""
         outcomes = []
         for check in self._checks:
+            if isinstance(check, _GuardCheck):
+                for text, path, passed, detail in judge(check.expected, stops):
+                    outcomes.append(Outcome(text, self._provenance.place((*check.path, *path)), passed, detail))
+                continue
             passed, detail = check.state.result(check.what)
             measure = check.state.measure(dotted(check.path))
             outcomes.append(Outcome(check.text, self._provenance.place(check.path), passed, detail, measure))

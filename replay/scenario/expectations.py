@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, Union
 
 from pydantic import Discriminator, Tag, model_validator
 
+from replay.guarding.part import GuardExpectation
 from replay.language.fields import Part, When, needs_one, rejected
 from replay.language.units import Distance, Time
 from replay.scenario.collision import GlobPair
@@ -61,7 +62,7 @@ class PairExpectation(Part):
         return self
 
 
-PARTS = {"pair": PairExpectation, **{kind.name: kind.expectation for kind in KINDS.values()}}
+PARTS = {"pair": PairExpectation, "guard": GuardExpectation, **{kind.name: kind.expectation for kind in KINDS.values()}}
 """Expectations by the key that tells what they are about."""
 
 

@@ -13,7 +13,7 @@ from replay.scenario.yaml_text import parse
 from replay.sensing.kinds import KINDS
 
 MAX_INCLUDE_DEPTH: Final = 8
-FRAGMENT_KEYS: Final = ("include", "links", "poses", "motion", "collision", "sensors", "model", "expect")
+FRAGMENT_KEYS: Final = ("include", "links", "poses", "motion", "collision", "sensors", "guards", "model", "expect")
 
 _MERGED_MAPS: Final = {
     ("links",),
@@ -24,6 +24,7 @@ _MERGED_MAPS: Final = {
     ("collision",),
     ("sensors",),
     *(("sensors", kind) for kind in KINDS),
+    ("guards",),
 }
 _MERGED_LISTS: Final = {("motion", "moves"), ("collision", "disable"), ("expect",)}
 

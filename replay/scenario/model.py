@@ -8,6 +8,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, StringConstraints, model_validator
 
+from replay.guarding.part import GuardPart
 from replay.language.fields import Name, Part, Text, Title, rejected
 from replay.language.units import Dimensioned, Duration, Rate
 from replay.scenario.collision import CollisionPart
@@ -39,6 +40,8 @@ class Fragment(Part):
     """What is tested for collision."""
     sensors: Sensors = Sensors()
     """Sensors."""
+    guards: dict[Name, GuardPart] = Field(default_factory=dict)
+    """Rules that slow and stop the motion."""
     model: Annotated[Model, BeforeValidator(builtin_model)] = Model()
     """The version of each method, or the name of a built-in model."""
     expect: tuple[Expectation, ...] = ()

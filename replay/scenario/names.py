@@ -5,16 +5,18 @@ other entries are wrong, so that all problems are listed at once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
 from replay.collision.columns import MARGIN
+from replay.guarding.part import GuardPart
 from replay.language.fields import Part
 from replay.language.globs import Globs, fits
 from replay.language.node import Node
-from replay.language.units import Dimensioned, Distance
+from replay.language.units import Dimensioned, Distance, Rate
 from replay.scenario.collision import DisablePart
 from replay.scenario.expectations import Expectation
 from replay.scenario.links import ContinuousPart, Joint, PrismaticPart, RevolutePart
@@ -172,6 +174,17 @@ class Names:
     def expect(self) -> list[Part | None]:
         """Expectations in order."""
         return [self._entry(Expectation, "expect", index) for index in self._list("expect")]
+
+    @cached_property
+    def rate(self) -> Fraction | None:
+        """Frames per second [Hz]."""
+        found: Fraction | None = None if self.root.child("rate") is None else self._entry(Rate, "rate")
+        return None if found is None else Fraction(found)
+
+    @cached_property
+    def guards(self) -> dict[str, GuardPart | None]:
+        """Guards by name."""
+        return {name: self._entry(GuardPart, "guards", name) for name in self._map("guards")}
 
     @property
     def tests_pairs(self) -> bool:

@@ -8,6 +8,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
+from replay.guarding.part import ReleasePart, parts_of, sensors_of
+from replay.language.fields import Part
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.names import matches
 from replay.scenario.unit_slips import beyond_a_turn
@@ -51,6 +53,7 @@ def notes(
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
     found.extend(beyond_a_turn(scenario))
     found.extend(_sensor_notes(scenario, model or scenario.model))
+    found.extend(_guard_notes(scenario))
     if (model or scenario.model).collision.between == "sampled":
         from replay.scenario.scene import primitive_solids
         from replay.scenario.speed_notes import speed_notes
@@ -74,6 +77,44 @@ def _sensor_notes(scenario: Scenario, model: Model) -> Iterator[Problem]:
         }
         for path, rule in kind.notes(written, felt, earth, getattr(model, kind.name)):
             yield scenario.provenance.problem(("sensors", kind.name, *path), rule)
+
+
+def _guard_notes(scenario: Scenario) -> Iterator[Problem]:
+    """Yield guards that could let go, but hold all that could end their condition."""
+    from replay.scenario.script import linkage
+
+    releasing = {
+        name: guard
+        for name, guard in scenario.guards.items()
+        if guard.stop is not None and isinstance(guard.release, ReleasePart)
+    }
+    machine = linkage(scenario) if releasing else None
+    for name, guard in releasing.items():
+        assert machine is not None
+        moving = set()
+        for a, b in _looked_at(scenario, guard.when):
+            chains = machine.chains_to_common_ancestor(machine.link_index(a), machine.link_index(b))
+            joints = [machine.links[k].joint for chain in chains for k in chain]
+            moving |= {joint.name for joint in joints if joint.type.value != "fixed"}
+        leaders = {machine.followers[joint].joint if joint in machine.followers else joint for joint in moving}
+        if leaders <= set(guard.joints):
+            rule = "has no effect: the condition depends on joints that the guard holds, and on no others"
+            yield scenario.provenance.problem(("guards", name, "release"), rule)
+
+
+def _looked_at(scenario: Scenario, when: Part) -> Iterator[tuple[str, str]]:
+    """Yield the two links of all that a condition looks at."""
+    for part in parts_of(when):
+        asked = getattr(part, "separation", part)
+        pair = getattr(asked, "pair", None)
+        shapes = [(link, shape) for link, entry in scenario.links.items() for shape in entry.shapes]
+        if pair is not None:
+            sides = [{link for link, shape in shapes if matches(side, link, shape)} for side in pair]
+            yield from ((a, b) for a in sides[0] for b in sides[1] if a != b)
+        for kind, name in sensors_of(part):
+            sensor = scenario.sensors.of(kind)[name]
+            sensed = {link for link, _ in shapes if not any(matches(pattern, link) for pattern in sensor.ignore)}
+            yield from ((sensor.link, link) for link in sorted(sensed - {sensor.link}))
 
 
 def piece_notes(bodies: Sequence[CollisionBody], pieces: str) -> list[str]:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from replay import limits
 from replay.errors import Problem
+from replay.guarding.part import CONDITIONS, condition_key
 from replay.language import decimal_comma
 from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
 from replay.language.node import Node
@@ -21,6 +22,8 @@ from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
 from replay.scenario.source import dotted, find, locate, problem_at
 
 Path = tuple[str | int, ...]
+Finding = tuple[Path, str]
+"""The path of a value, and the rule it breaks."""
 
 _LIKELY, _LONG = 500, 200
 """How many names a word is compared with, and how much of it: the time grows with their product."""
@@ -72,7 +75,8 @@ def _translate(detail: Any, root: Node, model: type[BaseModel]) -> Problem:
     if kind == "missing":
         return _missing(found, last, root)
     if kind == "extra_forbidden":
-        known = list(owner.model_fields) if owner is not None else []
+        fields = {} if owner is None else owner.model_fields
+        known = [field.alias or name for name, field in fields.items()]
         above = find(root, path[:-1])
         place = above.keys.get(str(path[-1]), root.place) if above is not None else root.place
         return place.problem(f"{dotted(path)}: unknown key; {did_you_mean(str(path[-1]), known)}")
@@ -155,7 +159,8 @@ def _tag(kind: str, context: dict[str, Any], found: _Location, root: Node) -> Pr
         if node is not None and not isinstance(node.value, dict):
             return problem_at(root, path, "must be a mapping (key: value)", kind=True)
         return locate(root, path).problem(f"{dotted((*path, 'type'))} is missing; known are {', '.join(found.tags)}")
-    return problem_at(root, path, f"needs one of the keys {', '.join(PARTS)}")
+    keys = CONDITIONS if context["discriminator"].startswith(condition_key.__name__) else PARTS
+    return problem_at(root, path, f"needs one of the keys {', '.join(keys)}")
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from replay.numerics.arrays import Floats, Integers
 from replay.scenario import frames, shapes
 from replay.scenario.expectation_check import ExpectationCheck, matching_pairs
 from replay.scenario.expectations import PairExpectation
+from replay.scenario.guards import SceneGuards, scene_guards
 from replay.scenario.layout import Layout
 from replay.scenario.load import load_model
 from replay.scenario.methods import Model
@@ -27,6 +28,7 @@ from replay.scenario.names import matches
 from replay.scenario.notes import notes, piece_notes
 from replay.scenario.script import linkage, script
 from replay.sensing.kinds import KINDS, of_kind
+from replay.sensing.signal.chain import Chain, Signals
 from replay.sensing.target import Target, make_target
 
 Color = tuple[int, int, int, int]
@@ -66,6 +68,8 @@ class Scene:
         bodies, pairs: what is tested for collision; no bodies when no pair is.
         targets: what sensors sense, sorted by name; none when there are no sensors.
         sensors: by kind, sorted by name; those of a kind are `scene.distance_sensors` too.
+        signals: the signal chains of the kinds of which a sensor has one.
+        guards: what guards look at and do; None when there are none.
         layout: the names behind the columns of results.
         notes: what a reader should know about the scenario and its meshes, one line each.
     """
@@ -80,6 +84,8 @@ class Scene:
     pairs: tuple[Pair, ...]
     targets: tuple[Target, ...]
     sensors: Mapping[str, tuple[Any, ...]]
+    signals: Mapping[str, Signals]
+    guards: SceneGuards | None
     layout: Layout
     notes: tuple[str, ...]
 
@@ -142,6 +148,7 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
     scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)
     sensors = {kind: _sensors(scenario, machine, kind, scene_shapes) for kind in KINDS}
+    signals = {kind: made for kind in KINDS if (made := _signals(scenario, kind)).chains}
     sensed = [shape for shape in scene_shapes if shape.sensed] if any(sensors.values()) else []
     targets = tuple(
         make_target(
@@ -162,20 +169,26 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
         pairs=tuple(pair.name for pair in pairs),
         objects=names if any(sensors[kind] and _each_object(kind) for kind in KINDS) else (),
         sensors={kind: tuple(sensor.name for sensor in found) for kind, found in sensors.items()},
+        guards=tuple(sorted(scenario.guards)),
+        signals={kind: tuple(made.names()) for kind, made in signals.items()},
     )
     _check_expectations(scenario, layout)
+    played = script(scenario)
+    guards = scene_guards(scenario.guards, Fraction(scenario.rate), machine, played, layout, signals)
     solids = {_link_and_shape(shape.name): shape.solid for shape in scene_shapes}
     return Scene(
         scenario=scenario,
         model=model,
         savings=savings,
         linkage=machine,
-        script=script(scenario),
+        script=played,
         shapes=scene_shapes,
         bodies=bodies,
         pairs=pairs,
         targets=targets,
         sensors=sensors,
+        signals=signals,
+        guards=guards,
         layout=layout,
         notes=(
             *(note.message for note in notes(scenario, model=model, solids=solids)),
@@ -289,6 +302,16 @@ def _sensors(scenario: Scenario, machine: Linkage, kind: str, scene_shapes: Sequ
         sensor = KINDS[kind].sensor(name, written, link, ignored)
         found.append(KINDS[kind].with_shapes(sensor, written, shapes))
     return tuple(found)
+
+
+def _signals(scenario: Scenario, kind: str) -> Signals:
+    """Return the signal chains of a kind's sensors."""
+    output, chains, rate = KINDS[kind].output, {}, Fraction(scenario.rate)
+    written = sorted(scenario.sensors.of(kind).items())
+    for column, (name, part) in enumerate(written):
+        if output is not None and part.signal is not None:
+            chains[column] = Chain(kind, name, part.signal, rate, output.substitute(part))
+    return Signals(chains, len(written))
 
 
 def _each_object(kind: str) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Discriminator, Field, StrictInt, StringConstraints, Tag, model_validator
 
 from replay import limits
 from replay.errors import Problem, ScenarioError
@@ -38,11 +38,30 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
 Path = tuple[str | int, ...]
 
 
+class CountPart(Part):
+    """Whole numbers one after another."""
+
+    from_: Annotated[StrictInt, Field(alias="from", ge=-(1 << 53), le=1 << 53)]
+    """The first."""
+    count: Annotated[StrictInt, Field(ge=1)]
+    """How many there are."""
+
+
+def _kind_of_values(value: object) -> str:
+    return "count" if isinstance(value, dict | CountPart) else "list"
+
+
+Values = Annotated[
+    Annotated[Annotated[tuple[Any, ...], Field(min_length=1)], Tag("list")] | Annotated[CountPart, Tag("count")],
+    Discriminator(_kind_of_values),
+]
+
+
 class SweepPart(Part):
     """Cases of this scenario: each replaces some values, and is a scenario of its own, named by them."""
 
-    grid: Annotated[dict[ValuePath, Annotated[tuple[Any, ...], Field(min_length=1)]], Field(min_length=1)] | None = None
-    """Values by path: one case for each combination."""
+    grid: Annotated[dict[ValuePath, Values], Field(min_length=1)] | None = None
+    """Values by path, a list or {from: 1, count: 1000}: one case for each combination."""
     list: Annotated[tuple[Annotated[dict[ValuePath, Any], Field(min_length=1)], ...] | None, Field(min_length=1)] = None
     """Values by path for each case."""
 
@@ -52,7 +71,8 @@ class SweepPart(Part):
             raise rejected("needs either grid (all combinations) or list (case by case)")
         count = len(self.list or ())
         if self.grid is not None:
-            count = math.prod(map(len, self.grid.values()))
+            numbers = (item.count if isinstance(item, CountPart) else len(item) for item in self.grid.values())
+            count = math.prod(numbers)
         if count > MAX_CASES:
             shown = count if count <= 10**9 else "more than 10^9"
             raise rejected(f"makes {shown} cases; at most {MAX_CASES} are run")
@@ -126,11 +146,21 @@ def _combinations(sweep: Node) -> Iterator[dict[str, Node]]:
     grid, listed = sweep.child("grid"), sweep.child("list")
     if grid is not None:
         paths = list(grid.mapping)
-        for values in itertools.product(*(grid.mapping[path].sequence for path in paths)):
+        for values in itertools.product(*(_values(grid.mapping[path]) for path in paths)):
             yield dict(zip(paths, values, strict=True))
     elif listed is not None:
         for entry in listed.sequence:
             yield dict(entry.mapping)
+
+
+def _values(node: Node) -> list[Node]:
+    """Return the values of a path in a grid: those of a list, or the numbers that are counted."""
+    first, number = (node.child(key) for key in ("from", "count"))
+    if first is None or number is None:
+        return node.sequence
+    assert isinstance(first.value, int) and isinstance(number.value, int)
+    counted = range(first.value, first.value + number.value)
+    return [Node(node.place, value, text=str(value)) for value in counted]
 
 
 def _nodes(node: Node) -> int:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from numpy.typing import NDArray
 
 from replay.language.fields import Part, rejected
-from replay.numerics.arrays import Floats
+from replay.language.units import Dimension
+from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns
 
 if TYPE_CHECKING:
@@ -71,6 +72,30 @@ class Expected:
     inside: bool = True
 
 
+@dataclass(frozen=True)
+class Output:
+    """The number that a sensor's electronics make a signal of; the column `measured` holds the signal.
+
+    Attributes:
+        reading: takes the columns, returns (n, S): the ideal one, NaN where there is none.
+        beyond: takes the columns, returns (n, S): whether something is nearer than the sensor reads.
+        substitute: takes a sensor as it is written, returns what its filter takes where there is no reading.
+        condition: what a guard may ask of it, as it is written; the key `name` of the kind names the sensor.
+        threshold: takes such a condition, returns below which value it holds.
+        dimension: of the reading.
+        charted: takes a sensor as it is written and a threshold, returns where this is in the first chart of the kind;
+            in that of `measured` it is itself.
+    """
+
+    reading: Callable[[Any], Floats]
+    beyond: Callable[[Any], Flags]
+    substitute: Callable[[Any], float]
+    condition: type[Part]
+    threshold: Callable[[Any], float]
+    dimension: Dimension
+    charted: Callable[[Any, float], float]
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """How a sensor is drawn, in its link's frame [m].
@@ -102,6 +127,7 @@ class SensorKind(ABC):
         models: its method in built-in models, by their names.
         expectation: what can be expected, as it is written; the key `name` names the sensor.
         expected: the same, as what is taken from the columns.
+        output: what becomes a signal where a sensor as it is written has a `signal`; None where none can have one.
         columns: what it reads: (n, S, ...) of n frames and S sensors. A field keeps its place, which is its number in
             messages; a new one is the last.
     """
@@ -114,6 +140,7 @@ class SensorKind(ABC):
     models: ClassVar[Mapping[str, Method]] = {}
     expectation: type[Part]
     expected: Sequence[Expected]
+    output: ClassVar[Output | None] = None
     columns: type[Columns]
 
     @property
@@ -125,8 +152,22 @@ class SensorKind(ABC):
         """Return the topic of a sensor."""
         return f"/{self.name}/{sensor}"
 
-    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
-        """Return the sensors of a scene; see `simulation.simulate` for `savings`.
+    def suite(
+        self,
+        sensors: Sequence[Any],
+        targets: Sequence[Target],
+        method: Method,
+        *,
+        savings: bool,
+        watched: frozenset[str] = frozenset(),
+    ) -> Suite:
+        """Return the sensors of a scene.
+
+        Args:
+            sensors, targets, method: of the scene.
+            savings: see `simulation.simulate`.
+            watched: names of the sensors whose readings of a frame must not depend on the frames after it, because
+                guards look at them. Where a method computes each frame by itself, that is so anyway.
 
         Raises:
             MissingPackageError: the method names an engine that is not installed.

@@ -7,7 +7,7 @@ from replay.collision.pairs import CollisionBody, plan_pairs
 from replay.collision.pipeline import CollisionPipeline
 from replay.geometry import primitives
 from tests.collision.motions import random_pose
-from tests.kinematics.scripts import random_motion
+from tests.kinematics.scripts import random_clocks, random_motion
 
 BOUNDS = ("obb", "sphere", "aabb", "obb_vertices")
 CLEARANCES = ("near", "always", "never")
@@ -31,10 +31,14 @@ def random_scene(rng):
     return linkage, motion, bodies, plan_pairs(bodies, linkage), size, span
 
 
-def check_intervals(seed, *, frames=6, samples=200):
-    """Hold what is said of a random scene's intervals against frames within; return how often each `Between` was."""
+def check_intervals(seed, *, frames=6, samples=200, slowed=False):
+    """Hold what is said of a random scene's intervals against frames within; return how often each `Between` was.
+
+    With `slowed` clocks brake and release the scripts of joints.
+    """
     rng = np.random.default_rng(seed)
     linkage, motion, bodies, pairs, size, span = random_scene(rng)
+    motion = random_clocks(rng, motion, span) if slowed else motion
     counts = np.zeros(len(Between), dtype=np.int64)
     if not pairs:
         return counts

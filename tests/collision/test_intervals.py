@@ -75,9 +75,10 @@ def test_a_cube_that_flies_through_a_plate_between_two_frames(options):
     assert (np.delete(columns.clearance_bound[1:, 0], 4) > 0.0).all()
 
 
+@pytest.mark.parametrize("slowed", [False, True])
 @pytest.mark.parametrize("seed", range(24))
-def test_nothing_false_on_random_articulated_motions(seed):
-    counts = check_intervals(seed, samples=60)
+def test_nothing_false_on_random_articulated_motions(seed, slowed):
+    counts = check_intervals(seed, samples=60, slowed=slowed)
     assert counts[Between.UNDECIDED] == 0
 
 

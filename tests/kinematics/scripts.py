@@ -1,7 +1,10 @@
 """Random linkages with random scripts of every kind."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from replay.kinematics.clock import Clock
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage
 from replay.kinematics.motion import FreeTrack, Keyframe, Move, Script, Track, Waypoint, plan
 from tests.collision.motions import pose, rotation
@@ -64,3 +67,17 @@ def random_motion(rng, *, links=6, span=1.0, size=1.0):
     linkage = Linkage(made)
     script = Script(points, tuple(moves), free, recorded, recorded_free)
     return linkage, plan(linkage, script)
+
+
+def random_clocks(rng, motion, span=1.0):
+    """Return the motion with clocks that brake, hold and go on again; some joints have none that does."""
+    clocks = []
+    for _ in motion.profiles:
+        clock, rate = Clock.steady(), 1.0
+        for begin in np.sort(rng.uniform(-0.1 * span, 1.1 * span, rng.integers(0, 6))).tolist():
+            ends = begin + span * rng.uniform(0.0, 0.3)
+            rate = clock.at(begin)[1]
+            target = float(rng.choice([0.0, 1.0, rng.uniform()]))
+            clock = clock.then(begin, rate, (target - rate) / (ends - begin)).then(ends, target, 0.0)
+        clocks.append(clock)
+    return replace(motion, clocks=tuple(clocks))

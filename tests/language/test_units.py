@@ -30,7 +30,7 @@ POWERS = {
 }
 POWERS |= {"mrad": -3, "m/s": 0, "cm/s": -2, "mm/s": -3, "rad/s": 0, "m/s^2": 0, "cm/s^2": -2, "mm/s^2": -3}
 POWERS |= {"rad/s^2": 0, "F": 0, "uF": -6, "nF": -9, "pF": -12, "fF": -15, "F/m": 0, "nF/m": -9, "pF/m": -12}
-POWERS |= {"ns": -9, "V": 0, "mV": -3, "kV": 3}
+POWERS |= {"ns": -9, "V": 0, "mV": -3, "kV": 3, "%": -2}
 DEGREES = ("deg", "deg/s", "deg/s^2")
 SPECIAL = {"in": "0.0254", "min": "60"}
 

@@ -60,7 +60,7 @@ def test_a_problem_in_a_fragment_is_placed_in_the_fragment():
         b="name: c\nlinks:\n  y: {parent: z}\nsensors: {distance: {d: {link: x, aperture: 5 m}}}\n",
     ) == [
         "b.yaml:1:1: name does not belong in an included file; it may hold include, links, poses, motion, collision, "
-        "sensors, model, expect",
+        "sensors, guards, model, expect",
         "b.yaml:3:15: links.y.parent = 'z' is no link; links are y, x",
         "b.yaml:4:45: sensors.distance.d.aperture = '5 m' is a length where an angle belongs; write a number [rad] or "
         "text such as '30 deg' (units: rad, deg, mrad)",

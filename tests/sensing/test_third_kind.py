@@ -240,7 +240,11 @@ def recorded(folder: Path) -> Path:
         ("reach: 17 cm}", "reach: 17 deg}", "is an angle where a length belongs"),
         ("link: arm, reach", "link: amr, reach", "sensors.touch.bumper.link = 'amr' is no link; did you mean 'arm'?"),
         ("touch: bumper", "touch: bamper", "is no touch sensor; did you mean 'bumper'?"),
-        ("touch: bumper, pressed", "push: bumper, pressed", "needs one of the keys pair, distance, capacitive, touch"),
+        (
+            "touch: bumper, pressed",
+            "push: bumper, pressed",
+            "needs one of the keys pair, guard, distance, capacitive, touch",
+        ),
         ("version: 1", "version: 1\nmodel: {touch: {method: hull}}", "model.touch.method = 'hull' must be 'hulls' or"),
     ],
 )

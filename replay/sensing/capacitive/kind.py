@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from replay.language.units import VOLTAGE
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.part import (
     ELECTROSTATIC,
+    CapacitiveCondition,
     CapacitiveExpectation,
     CapacitiveMethod,
     CapacitiveSensorPart,
 )
-from replay.sensing.kind import Drawing, Expected, Method, SensorKind, Suite
+from replay.sensing.kind import Drawing, Expected, Method, Output, SensorKind, Suite
 
 if TYPE_CHECKING:
     from replay.sensing.capacitive.sensor import CapacitiveSensor
@@ -41,6 +43,16 @@ class Capacitive(SensorKind):
     expected = (
         Expected("output", lambda columns: columns.output_voltage, unit="V"),
         Expected("saturated", lambda columns: columns.saturated),
+        Expected("measured", lambda columns: columns.measured, unit="V"),
+    )
+    output = Output(
+        reading=lambda columns: columns.output_voltage,
+        beyond=lambda columns: columns.saturated,
+        substitute=lambda part: part.supply,
+        condition=CapacitiveCondition,
+        threshold=lambda condition: condition.output.below,
+        dimension=VOLTAGE,
+        charted=lambda part, threshold: part.supply - threshold,
     )
     columns = CapacitiveColumns
 
@@ -60,7 +72,7 @@ class Capacitive(SensorKind):
             Plate(name=plate, T_link_plate=written.pose.transform(), half_size=0.5 * np.array(written.size))
             for plate, written in sorted(part.plates.items())
         )
-        same = part.model_dump(exclude={"link", "plates", "back", "ignore"})
+        same = part.model_dump(exclude={"link", "plates", "back", "ignore", "signal"})
         return CapacitiveSensor(name=name, link=link, plates=plates, **same, ignored_links=ignored_links)
 
     def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[tuple[str | int, ...], str]:
@@ -73,13 +85,22 @@ class Capacitive(SensorKind):
         """See `SensorKind`: what is behind the plates."""
         return replace(sensor, back=tuple((name, shapes[name]) for name in part.back))
 
-    def suite(self, sensors: Sequence[Any], targets: Sequence[Target], method: Method, *, savings: bool) -> Suite:
+    def suite(
+        self,
+        sensors: Sequence[Any],
+        targets: Sequence[Target],
+        method: Method,
+        *,
+        savings: bool,
+        watched: frozenset[str] = frozenset(),
+    ) -> Suite:
         """See `SensorKind`."""
         if method.method not in ELECTROSTATIC:
             return super().suite(sensors, targets, method, savings=savings)
         from replay.sensing.electrostatics.suite import ElectrostaticSuite
 
-        return ElectrostaticSuite(sensors, targets, method=method.method, savings=savings, **method.options())
+        options = {"method": method.method, "savings": savings, "watched": watched, **method.options()}
+        return ElectrostaticSuite(sensors, targets, **options)
 
     def kernels(self, method: Method, *, savings: bool) -> tuple[Any, ...]:
         """See `SensorKind`."""

@@ -9,6 +9,7 @@ from pydantic import Field, StrictInt, model_validator
 from replay.language.fields import Flag, Glob, Name, Part, Pose, Size2, When, in_order, needs_one
 from replay.language.units import NUMBER, Capacitance, Permittivity, Quantity, StrayCapacitance, Supply, Voltage
 from replay.sensing.kind import Method
+from replay.sensing.signal.part import VoltageSignal
 
 Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below=1.0)]
 
@@ -56,6 +57,8 @@ class CapacitiveSensorPart(Part):
     """Whether what is behind the plates has their voltage, as a guard electrode, and not 0 V."""
     ignore: tuple[Glob, ...] = ()
     """Patterns of the names of links that are not sensed; the sensor's own link never is."""
+    signal: VoltageSignal | None = None
+    """What electronics make of the output voltage."""
 
 
 class CapacitiveMethod(Method):
@@ -90,6 +93,22 @@ class CapacitiveMethod(Method):
         return {}
 
 
+class OutputBelow(Part):
+    """A threshold of an output voltage."""
+
+    below: Voltage
+    """The threshold [V]; a saturated sensor is below it."""
+
+
+class CapacitiveCondition(Part):
+    """A capacitive sensor tells less than a threshold."""
+
+    capacitive: Name
+    """Name of the capacitive sensor."""
+    output: OutputBelow
+    """The threshold of its output voltage."""
+
+
 class OutputBounds(Part):
     """Bounds of an output voltage."""
 
@@ -114,8 +133,10 @@ class CapacitiveExpectation(Part):
     """Bounds of the output voltage."""
     saturated: When | None = None
     """Whether the capacitance is infinite."""
+    measured: OutputBounds | None = None
+    """Bounds of what the sensor's signal chain tells."""
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
-        needs_one(self, "output", "saturated")
+        needs_one(self, "output", "saturated", "measured")
         return self

@@ -31,6 +31,8 @@ class DistanceColumns(Columns):
         shape: (n, D) int32, index into `Layout.shapes`, -1 when nothing is detected.
         triangle: (n, D) int32, index into the shape's triangles, -1 when nothing is detected.
         case: (n, D) uint8, the thesis's case 1..5, 0 when nothing is detected.
+        measured: (n, D) [m], what the sensors' signal chains make of the distance; NaN while there is no sample, or it
+            is of nothing, and of sensors that have no chain. None where no sensor has one.
     """
 
     status: Annotated[Bytes, Field(states=Detection, open=(1, 2), events={"detection": 2, "too close": 3})]
@@ -41,3 +43,4 @@ class DistanceColumns(Columns):
     shape: Annotated[ShortIntegers, Field(gate="status", names="shapes")]
     triangle: Annotated[ShortIntegers, Field(gate="status")]
     case: Annotated[Bytes, Field(gate="status", most=5)]
+    measured: Annotated[Floats | None, Field(unit="m", signal=True, since=2, chart="Distance as measured [m]")] = None

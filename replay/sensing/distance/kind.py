@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from replay.language.units import LENGTH
 from replay.numerics import transforms
 from replay.sensing.distance.columns import Detection, DistanceColumns
-from replay.sensing.distance.part import DistanceExpectation, DistanceMethod, DistanceSensorPart
-from replay.sensing.kind import Drawing, Expected, SensorKind
+from replay.sensing.distance.part import DistanceCondition, DistanceExpectation, DistanceMethod, DistanceSensorPart
+from replay.sensing.kind import Drawing, Expected, Output, SensorKind
 
 if TYPE_CHECKING:
     from replay.sensing.distance.suite import DistanceSensor
@@ -32,6 +33,16 @@ class Distance(SensorKind):
     expected = (
         Expected("distance", lambda columns: columns.distance, unit="m", inside=False),
         Expected("detected", lambda columns: columns.status != Detection.NOTHING),
+        Expected("measured", lambda columns: columns.measured, unit="m"),
+    )
+    output = Output(
+        reading=lambda columns: columns.distance,
+        beyond=lambda columns: columns.status == Detection.TOO_CLOSE,
+        substitute=lambda part: part.range,
+        condition=DistanceCondition,
+        threshold=lambda condition: condition.below,
+        dimension=LENGTH,
+        charted=lambda part, threshold: threshold,
     )
     columns = DistanceColumns
 

@@ -48,6 +48,7 @@ class ElectrostaticSuite:
         drive: "alone": output voltages with one sensor of a unit driven at a time; "together": with all of them.
         savings: False solves every frame anew; else readings of frames between those that are solved are splines, and
             `error` holds what that costs, at most about 0.5 % (`keyframes`).
+        watched: names of sensors whose units are solved in every frame: what they read must not depend on later ones.
 
     Attributes:
         stations: the units.
@@ -66,6 +67,7 @@ class ElectrostaticSuite:
         method: str = "bem",
         drive: str = "alone",
         savings: bool = True,
+        watched: frozenset[str] = frozenset(),
     ) -> None:
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
@@ -75,6 +77,7 @@ class ElectrostaticSuite:
         self._proxy: dict[int, Proxy] = {}
         self._together = drive == "together"
         self._savings = savings
+        self._watched = watched
         self._factor = np.array([sensor.permittivity / VACUUM_PERMITTIVITY for sensor in self.sensors])
 
     def run(self, poses: LinkPoses) -> CapacitiveColumns:
@@ -106,6 +109,7 @@ class ElectrostaticSuite:
         if not station.bodies:
             return Solved.nothing(frames, k, len(station.plates))
         T = np.stack([poses.relative(station.link, link) for link in station.links], axis=1)
+        splines = self._savings and not any(self.sensors[column].name in self._watched for column in station.sensors)
         track = PoseTrack.of(T) if self._savings else PoseTrack.every(T)
         targets = [self.targets[column] for column in station.objects]
         standing = stand(station, targets, np.ascontiguousarray(track.poses))
@@ -117,7 +121,7 @@ class ElectrostaticSuite:
                 self.solved += 1
             return readings[pose]
 
-        if self._savings and len(track.poses) > FEW:
+        if splines and len(track.poses) > FEW:
             found = between_keys(
                 lambda frame: solve(int(track.pose_of[frame])),
                 self._proxies(station, standing)[track.pose_of],
