@@ -96,9 +96,10 @@ class Measures:
             names = next((f.name for f in described.columns.fields() if f.names == "shapes"), None)
             about = None if names is None else getattr(columns, names)
             for expected in described.expected:
-                values = np.asarray(expected.values(columns))
-                if not expected.unit or not values.shape[1]:
-                    continue
+                read = expected.values(columns)
+                if not expected.unit or read is None or not np.shape(read)[1]:
+                    continue  # a boolean; no sensor has a signal; no sensor
+                values = np.asarray(read)
                 for word, sign in (("min", 1), ("max", -1)):
                     key = kind, expected.what, word
                     extreme = self._readings.setdefault(key, _Extreme(values.shape[1], sign))
