@@ -158,11 +158,7 @@ def _thresholds(scene: Scene) -> Iterator[tuple[str, str, float]]:
             if isinstance(leaf, PairLeaf) and leaf.below > 0.0:
                 yield CLEARANCE, f"{guard.name} acts", leaf.below
             if isinstance(leaf, SensorLeaf):
-                name, output = scene.layout.sensors[leaf.kind][leaf.column], KINDS[leaf.kind].output
-                assert output is not None
+                name = scene.layout.sensors[leaf.kind][leaf.column]
                 charts = {field.name: chart for chart, field in CHARTED[leaf.kind].items()}
                 measured = name in scene.layout.signals.get(leaf.kind, ())
-                place = (
-                    leaf.below if measured else output.charted(scene.scenario.sensors.of(leaf.kind)[name], leaf.below)
-                )
-                yield charts["measured"] if measured else leaf.kind, f"{guard.name} acts on {name}", place
+                yield charts["measured"] if measured else leaf.kind, f"{guard.name} acts on {name}", leaf.below

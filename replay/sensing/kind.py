@@ -83,8 +83,6 @@ class Output:
         condition: what a guard may ask of it, as it is written; the key `name` of the kind names the sensor.
         threshold: takes such a condition, returns below which value it holds.
         dimension: of the reading.
-        charted: takes a sensor as it is written and a threshold, returns where this is in the first chart of the kind;
-            in that of `measured` it is itself.
     """
 
     reading: Callable[[Any], Floats]
@@ -93,7 +91,6 @@ class Output:
     condition: type[Part]
     threshold: Callable[[Any], float]
     dimension: Dimension
-    charted: Callable[[Any, float], float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from typing import Annotated
 from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns, Field
 
-_CHART = "Capacitive sensors: output voltage [V]"
 _MEASURED = "Capacitive sensors: output voltage as measured [V]"
+_CHART = "Capacitive sensors: output voltage [V]"
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,6 @@ class Capacitive(SensorKind):
         condition=CapacitiveCondition,
         threshold=lambda condition: condition.output.below,
         dimension=VOLTAGE,
-        charted=lambda part, threshold: part.supply - threshold,
     )
     columns = CapacitiveColumns
 
