@@ -66,6 +66,7 @@ type: $(VENV)/.test  ## check types
 schemas: $(VENV)/.test  ## write the generated schemas again
 	$(BIN)/python -m replay.scenario.schema
 	$(BIN)/python -m replay.comparison.rules_file
+	$(BIN)/python -m replay.scenario.reference
 
 robot: setup  ## import the shipped robot again from its package
 	$(call install,--no-deps example-robot-data)

@@ -57,6 +57,8 @@ RECORD_JSON: Final = 16 * MIB
 """Bytes of run.json, of result.json, and of the metadata of a recording."""
 HISTORY: Final = 256 * MIB
 """Bytes of a history of nights."""
+LOG_SHOWN: Final = 64 << 10
+"""Bytes at the end of a scenario's log that reports show lines of."""
 
 # Descriptions of robots: URDF, SRDF, COLLADA
 

@@ -24,7 +24,6 @@ from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.errors import LimitError, MeshError, RecordingError, ScenarioError
 from replay.geometry.mesh_file import read_faces
-from replay.json_text import read_json, typed
 from replay.logs.mcap_reader import McapLog
 from replay.logs.message_log import open_bag_folder, open_message_log
 from replay.logs.protobuf import fields_of, message_type
@@ -34,7 +33,7 @@ from tests.fuzz.damage import build, metadata, record, text
 from tests.fuzz.doors import RECORDED, SCENARIO
 from tests.geometry.test_mesh_file import glb
 
-README = (Path(replay.__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+README = (Path(replay.__file__).parents[1] / "schemas" / "README.md").read_text(encoding="utf-8")
 HEAD = (1, text("") + text("x"))
 MESSAGE = record(5, struct.pack("<HIQQ", 1, 0, 5, 5))
 
@@ -121,6 +120,15 @@ def branching(levels: int, *, recursive: bool) -> bytes:
             if inner < levels:
                 type_.field.add(name=f"f{number}", number=number, label=1, type=11, type_name=f".T{inner}")
     return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+
+
+def test_a_message_type_has_as_many_fields_as_are_read_and_not_one_more(monkeypatch) -> None:
+    descriptor = message_type("a", "T0", branching(3, recursive=False)).DESCRIPTOR  # 2 fields, 2 x 2, and none in these
+    monkeypatch.setattr(limits, "SCHEMA_FIELDS", 6)
+    assert len(list(fields_of("a", descriptor))) == 6
+    monkeypatch.setattr(limits, "SCHEMA_FIELDS", 5)
+    with pytest.raises(LimitError, match="more than 5 fields"):
+        list(fields_of("a", descriptor))
 
 
 def test_fields_within_fields_are_counted() -> None:
@@ -306,30 +314,6 @@ PLY = (
 def test_meshes_are_bounded(name, data, words) -> None:
     with pytest.raises(MeshError, match=words):
         read_faces(name, data())
-
-
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"[" * 100_000, "nested too deeply"),
-        (b'{"a": ' + b"1" * 5_000 + b"}", "too long"),
-        (b'["\\ud800"]', "surrogate"),
-        (b"[" + b"[]," * 1_100_000 + b"1]", "at most 1000000 are read"),
-        (b"\xff", "UTF-8"),
-        (b"{", "line 1, column 2"),
-    ],
-)
-def test_json_is_read_within_bounds_or_is_one_line(data, words) -> None:
-    with pytest.raises(ValueError, match=words) as caught:
-        read_json(data)
-    assert "\n" not in str(caught.value)
-
-
-def test_values_of_json_are_of_the_types_that_are_asked_for() -> None:
-    assert typed({"a": [1]}, dict[str, list[int]]) == {"a": [1]}
-    for value, place in (({"a": [True]}, "a.0"), ({"a": 1}, "a"), ([], "Input")):
-        with pytest.raises(ValueError, match=place):
-            typed(value, dict[str, list[int]])
 
 
 def test_a_refusal_stays_within_two_gib(tmp_path) -> None:

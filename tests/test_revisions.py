@@ -9,6 +9,7 @@ import pytest
 from replay.scenario.methods import METHOD_REVISIONS
 from tests import frozen
 
+pytestmark = pytest.mark.compiled  # a scene of 121 frames, by every version of every method
 READINGS = json.loads(frozen.READINGS.read_text())
 CAUSES = {
     "collision.pieces": ("collision.narrowphase.gjk",),

@@ -79,7 +79,12 @@ def use(installed, cwd, *arguments):
 
 def test_the_wheel_holds_what_people_and_editors_need(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    for file in (*(ROOT / "schemas").iterdir(), *(ROOT / "scenarios").glob("*.yaml"), *(ROOT / "replay").rglob("*.j2")):
+    for file in (
+        *(ROOT / "schemas").iterdir(),
+        *(ROOT / "scenarios").glob("*.yaml"),
+        *(ROOT / "replay").rglob("*.j2"),
+        *(ROOT / "replay").rglob("*.js"),
+    ):
         assert any(name.endswith(f"/{file.relative_to(ROOT)}") or name == str(file.relative_to(ROOT)) for name in names)
     assert "replay/py.typed" in names
     assert not any("__pycache__" in name or name.startswith("tests/") for name in names)

@@ -39,13 +39,16 @@ class Baseline:
         self.directory = directory
 
     def recording(self, name: str) -> Path | None:
-        """Return a scenario's accepted recording, or None."""
+        """Return a scenario's accepted recording, or None; also one that may not be looked for, and cannot be read."""
         path = self._path(name)
-        return path if path.is_file() else None
+        try:
+            return path if path.is_file() else None
+        except OSError:
+            return path
 
     def names(self) -> list[str]:
         """Return the names of all scenarios that have one."""
-        return sorted(path.stem for path in self.directory.glob("*/*.mcap") if path.parent.name == path.stem)
+        return sorted(folder.name for folder in self.directory.glob("*") if _may_be(self._path(folder.name)))
 
     def store(self, entries: Mapping[str, Entry], *, reason: str, now: datetime.datetime) -> None:
         """Store recordings by scenario and append what and why to the log.
@@ -151,6 +154,17 @@ class Baseline:
             if file.name not in needed and is_digest(file.name) and file.is_file() and not file.is_symlink():
                 with contextlib.suppress(OSError):
                     file.unlink()
+
+
+def _may_be(path: Path) -> bool:
+    """Return whether there is something at a path, or nobody knows."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        pass
+    return True
 
 
 def _ends_in(file: Path, data: bytes) -> bool:

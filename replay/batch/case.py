@@ -14,11 +14,13 @@ from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
 from replay.scenario.guard_outcomes import lines
+from replay.scenario.measures import Measure, Measures
 from replay.scenario.unseen import Unseen
 
 if TYPE_CHECKING:
-    from replay.batch.written import WrittenResult
+    from replay.batch.written import WrittenMeasure, WrittenResult
     from replay.guarding.outcome import GuardOutcomes
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
     from replay.simulation import FrameBlock
@@ -79,6 +81,7 @@ class CaseResult:
         between_frames: contacts that no frame shows, and what is not proven, a line each.
         guards: what became of each trigger of a guard, see `guarding.outcome.Stop.as_json`; `reactions` says it in
             lines for people.
+        measures: its results as numbers: of its expectations, and extremes of its readings.
         reused: taken from an earlier run.
         no_space: it failed because the disk is full.
     """
@@ -97,6 +100,7 @@ class CaseResult:
     between_frames: tuple[str, ...] = ()
     guards: tuple[dict[str, Any], ...] = ()
     reactions: tuple[str, ...] = ()
+    measures: tuple[Measure, ...] = ()
     reused: bool = False
     no_space: bool = False
 
@@ -115,6 +119,7 @@ class CaseResult:
             "notes": list(self.notes),
             "between_frames": list(self.between_frames),
             **({"guards": list(self.guards), "reactions": list(self.reactions)} if self.guards else {}),
+            "results": [measure.as_json(self.name) for measure in self.measures],
         }
 
     @staticmethod
@@ -132,13 +137,19 @@ class CaseResult:
             between_frames=tuple(values.get("between_frames", ())),
             guards=tuple(values.get("guards", ())),
             reactions=tuple(values.get("reactions", ())),
+            measures=tuple(map(_measure, values.get("results", ()))),
             reused=True,
         )
+
+
+def _measure(row: WrittenMeasure) -> Measure:
+    return Measure(row["name"], row["value"], row["unit"], row["time"], row["subject"], row["limit"], row["margin"])
 
 
 def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     """Run one scenario into its folder and return what became of it; recordings that exist are replaced."""
     from replay.recording.record import record_blocks
+    from replay.scenario.first_frame import FirstFrame
     from replay.scenario.scene import build
     from replay.simulation import Simulation
 
@@ -147,9 +158,10 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     try:
         scene = build(scenario, model=order.model, savings=order.savings)
         simulation = Simulation(scene)
-        check, unseen = scene.expectation_check(), Unseen(scene.layout)
+        check, unseen, measures = scene.expectation_check(), Unseen(scene.layout), Measures(scene.layout)
+        first = FirstFrame(scenario, scene.layout)
         reactions = None if simulation.guarding is None else simulation.guarding.outcomes()
-        blocks = _checked(simulation.blocks(), check, unseen, reactions)
+        blocks = _checked(simulation.blocks(), check, unseen, measures, first, reactions)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
@@ -171,10 +183,11 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *(note for suite in simulation.suites.values() for note in suite.notes())),
+        notes=(*scene.notes, *(n for suite in simulation.suites.values() for n in suite.notes()), *first.lines()),
         between_frames=unseen.lines(),
         guards=tuple(stop.as_json() for stop in stops),
         reactions=tuple(lines(stops)),
+        measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results()),
     )
 
 
@@ -193,11 +206,18 @@ def describe(result: CaseResult) -> list[str]:
 
 
 def _checked(
-    blocks: Iterator[FrameBlock], check: ExpectationCheck, unseen: Unseen, reactions: GuardOutcomes | None
+    blocks: Iterator[FrameBlock],
+    check: ExpectationCheck,
+    unseen: Unseen,
+    measures: Measures,
+    first: FirstFrame,
+    reactions: GuardOutcomes | None,
 ) -> Iterator[FrameBlock]:
     for block in blocks:
         if reactions is not None:
             reactions.update(block.time, block.collision)
+        first.update(block.collision, block.readings)
+        measures.update(block.time, block.collision, block.readings)
         check.update(block.time, block.collision, block.readings)
         unseen.update(block.collision)
         yield block

@@ -7,6 +7,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+from replay import limits
 from replay.batch.case import CaseResult, CaseStatus, describe
 from replay.batch.written import RESULT
 from replay.errors import NoSpaceError, WriteError, printable
@@ -46,6 +47,17 @@ def finish(result: CaseResult, folder: Path) -> CaseResult:
                 (folder / f"{result.name}{kind}").unlink(missing_ok=True)
         result = _told(result, folder)
     return result
+
+
+def said(folder: Path) -> list[str]:
+    """Return the last lines of a scenario's log; none where it cannot be read."""
+    log = folder / LOG
+    with contextlib.suppress(OSError):
+        if log.is_file():
+            with log.open("rb") as stream:
+                stream.seek(max(log.stat().st_size - limits.LOG_SHOWN, 0))
+                return stream.read(limits.LOG_SHOWN).decode(errors="replace").splitlines()
+    return []
 
 
 def unwritable(result: CaseResult, error: WriteError) -> CaseResult:

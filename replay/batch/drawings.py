@@ -1,14 +1,15 @@
-"""How much of a night may be drawings: they are kept until its page is written, and are most of both."""
+"""How much of a night may be drawings: they are most of what its pages take on the disk."""
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Sequence
 
-from replay.batch.judged import Judged
 from replay.comparison.plots import Plot
 
-ROOM = 32 << 20
-"""Bytes of all drawings of a night; those of a long scenario in which everything changed are some 10 MiB."""
+ROOM = 512 << 20
+"""Bytes of all drawings of a night."""
+ROOM_OF_ONE = 4 << 20
+"""Bytes of the drawings of one scenario; those of a long one in which everything changed would be some 10 MiB."""
 
 
 class Album:
@@ -17,12 +18,14 @@ class Album:
     def __init__(self) -> None:
         self._left = ROOM
 
-    def keep(self, item: Judged) -> Judged:
-        """Return a scenario with those of its drawings for which there is room; the first are of what decides."""
+    def keep(self, drawn: Sequence[Plot]) -> tuple[tuple[Plot, ...], bool]:
+        """Return those drawings of a scenario for which there is room, the first ones, and whether these are all."""
         kept: list[Plot] = []
-        for plot in item.drawings:
+        room = min(self._left, ROOM_OF_ONE)
+        for plot in drawn:
+            room -= plot.size
+            if room < 0:
+                return tuple(kept), False
             self._left -= plot.size
-            if self._left < 0:
-                return dataclasses.replace(item, drawings=tuple(kept), undrawn=True)
             kept.append(plot)
-        return item
+        return tuple(kept), True

@@ -48,9 +48,15 @@ class _Search:
         try:
             for path in sorted(folder.iterdir()):
                 if not path.name.startswith("."):
-                    self._entry(path, here)
+                    self._looked_at(path, here)
         except OSError as error:
             self.left_out.append(f"{folder} is left out: it cannot be looked through: {error.strerror}")
+
+    def _looked_at(self, path: Path, here: Path) -> None:
+        try:
+            self._entry(path, here)
+        except OSError as error:  # a link into a folder that may not be looked into
+            self.left_out.append(f"{path} is left out: it cannot be looked at: {error.strerror}")
 
     def _entry(self, path: Path, here: Path) -> None:
         if path.is_dir():

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from replay.batch.case import CaseResult
+from replay.batch.finding import Finding
 from replay.batch.run_file import Run
-from replay.comparison.plots import Plot
-from replay.comparison.runs import Case
+from replay.comparison.effects import Severity
 
-INDEX, JUNIT = "index.html", "junit.xml"
+INDEX, JUNIT, SUMMARY, METRICS = "index.html", "junit.xml", "summary.md", "metrics.parquet"
+REPORTS = (INDEX, JUNIT, SUMMARY, METRICS)
 """Names of the reports in a run folder."""
+PICTURE = "worst.png"
+"""Name of the picture of a scenario's worst moment in its folder."""
+PAGE = "report.html"
+"""Name of a scenario's own page in its folder."""
 OVERLAY = "{name}.difference.rrd"
 """Name of the recording that shows both runs of a scenario."""
 
@@ -55,20 +61,41 @@ class Judged:
         verdict: what became of it.
         message: one line that says why; "" when it is the same.
         result: of its run; None when it was skipped.
-        comparison: with its baseline; None when there was none to make.
-        drawings: of its signals that differ.
-        undrawn: there are more, for which the page has no room.
+        finding: what its comparison with its baseline said; None when there was none to make.
         source: file that it was read from, as the user named it.
+        tags: of the scenario.
     """
 
     name: str
     verdict: RegressVerdict
     message: str = ""
     result: CaseResult | None = None
-    comparison: Case | None = None
-    drawings: tuple[Plot, ...] = ()
-    undrawn: bool = False
+    finding: Finding | None = None
     source: str = ""
+    tags: tuple[str, ...] = ()
+
+    @property
+    def severity(self) -> Severity:
+        """How much it matters."""
+        if self.verdict is RegressVerdict.BROKEN:
+            return Severity.BROKEN
+        if self.finding is not None and self.finding.effects:
+            return self.finding.effects[0].severity
+        if self.verdict in (RegressVerdict.MISSING, RegressVerdict.UNREADABLE):
+            return Severity.UNCOMPARED
+        bookkeeping = self.verdict.fine or self.verdict is RegressVerdict.DIFFERENT
+        return Severity.BOOKKEEPING if bookkeeping else Severity.CRASHED
+
+    @property
+    def size(self) -> float:
+        """How large the worst difference is, in tolerances; infinite where there is no number for it."""
+        found = self.finding.effects if self.finding is not None else ()
+        return found[0].size if found else math.inf
+
+    @property
+    def order(self) -> tuple[object, ...]:
+        """What rows of scenarios are sorted by: the worst first."""
+        return self.verdict.fine, self.severity, -self.size, self.name
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,9 +53,9 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
     model = needs.model
     found: tuple[Any, ...] = ()
     if needs.meshes:
-        from replay.geometry import closing, containment, mesh, tree
+        from replay.geometry import closing, containment, convexity, facets, mesh, tree
 
-        found += entries_of(tree, mesh, closing, containment)
+        found += entries_of(tree, mesh, facets, convexity, closing, containment)
     if needs.collision:
         from replay.collision import pipeline
 

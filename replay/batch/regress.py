@@ -4,48 +4,43 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import shutil
-import traceback
+import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from replay.batch.baseline import Baseline
-from replay.batch.case import CaseResult, CaseStatus
-from replay.batch.case_folder import LOG
 from replay.batch.claim import claim
 from replay.batch.create import create_baselines, recording_of
-from replay.batch.drawings import Album
 from replay.batch.history import check_history
-from replay.batch.judged import INDEX, JUNIT, OVERLAY, Judged, Regression, RegressVerdict
+from replay.batch.judge import Judge, MissingBaseline, unjudged
+from replay.batch.judged import OVERLAY, PAGE, PICTURE, REPORTS, Judged, Regression, RegressVerdict
+from replay.batch.report_case import again
 from replay.batch.run import Execution, run_all
 from replay.batch.run_file import Run
 from replay.batch.select import Selection
 from replay.batch.watch import Unwatched, Watch
-from replay.comparison import wording
-from replay.comparison.difference import DiffVerdict
 from replay.comparison.log_changes import same_messages
-from replay.comparison.overlay import write_overlay
-from replay.comparison.plots import plots
 from replay.comparison.rules import Rules
-from replay.comparison.runs import Case, RecordingPair, diff_pair, read_pair
-from replay.errors import InvalidValue, NoSpaceError, RecordingError, ReplayError, count, printable
-from replay.logs.part_file import append_lines
+from replay.errors import InvalidValue, count
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
-MissingBaseline = Literal["fail", "create", "skip"]
-Rrd = Literal["failing", "all", "none"]
+
+@dataclass(frozen=True)
+class Rrd:
+    """Which scenarios get rerun recordings: those that fail, the worst `most` of them; all; or none."""
+
+    kind: Literal["failing", "all", "none"] = "failing"
+    most: int = sys.maxsize
+
+
+FAILING = Rrd()
 _AGAIN = ".rrd"
 """Folder in which failing scenarios are recorded for eyes."""
-_KNOWN = (
-    RegressVerdict.SAME,
-    RegressVerdict.DIFFERENT,
-    RegressVerdict.CREATED,
-    RegressVerdict.MISSING,
-    RegressVerdict.UNCOMPARED,
-)
-"""Verdicts beside which a broken expectation is what matters."""
 
 
 def regress(
@@ -56,7 +51,8 @@ def regress(
     rules: Rules | None = None,
     rules_file: str = "",
     missing: MissingBaseline = "fail",
-    rrd: Rrd = "failing",
+    rrd: Rrd = FAILING,
+    pictures: int = 0,
     model: Model | None = None,
     model_name: str = "",
     history: Path | None = None,
@@ -76,6 +72,7 @@ def regress(
         rules_file: where they come from, for reports.
         missing: what a scenario without a baseline is: a failure, a new baseline, or left out.
         rrd: which scenarios get rerun recordings; those that differ also get one that shows both runs.
+        pictures: of how many scenarios that differ the worst moment is rendered; needs what shows both runs.
         model: replaces the scenarios' own models.
         model_name: how the user named it, for reports.
         history: file that the reports will append to, to find out now that it cannot be.
@@ -94,12 +91,12 @@ def regress(
     with claim(directory):
         accepted, watch, rules = Baseline(baseline), watch or Unwatched(), rules or Rules()
         names = [*(scenario.name for scenario in selection.chosen), *selection.invalid]
-        _forget(directory, names, drawings=not (resume and rrd == "all"))
+        _forget(directory, names, drawings=not (resume and rrd.kind == "all"))
         run = run_all(
             selection.chosen,
             directory,
             model=model,
-            rrd=rrd == "all",
+            rrd=rrd.kind == "all",
             overwrite=not resume,
             resume=resume,
             whole=False,
@@ -110,27 +107,38 @@ def regress(
         if run.interrupted:
             watch = Unwatched()  # it has told its request; another one ends the comparison too
         judged: dict[str, Judged] = {}
-        album = Album()
+        judge = Judge(
+            directory,
+            accepted,
+            rules,
+            missing=missing,
+            overlays=0 if rrd.kind == "none" else rrd.most,
+            again=functools.partial(again, selection.sources, baseline, rules_file, model_name),
+        )
         ran = list(zip(selection.chosen, run.results, strict=False))  # those that failed before come after these
         try:
             for scenario, result in ran:
                 watch.compare(scenario.name)
-                item = _judge(scenario.name, result, accepted, rules, missing, overlay=rrd != "none")
-                judged[scenario.name] = album.keep(item)
+                judged[scenario.name] = judge.judge(scenario, result)
             with watch.undisturbed():
                 judged |= create_baselines(judged, accepted)
-            if rrd == "failing" and not run.interrupted:
-                attention = [item for item in judged.values() if not item.verdict.fine]
-                failing = {item.name for item in attention if item.result and item.result.status.recorded}
+            if rrd.kind == "failing" and not run.interrupted:
+                attention = sorted((item for item in judged.values() if not item.verdict.fine), key=lambda i: i.order)
+                recorded = [item.name for item in attention if item.result and item.result.status.recorded]
+                failing = set(recorded[: rrd.most])
                 _show(selection.chosen, failing, run, model=model, execution=execution, watch=watch)
+            if pictures and not run.interrupted:
+                from replay.batch.pictures import take_pictures
+
+                take_pictures(sorted(judged.values(), key=lambda item: item.order), directory, pictures, watch)
         except KeyboardInterrupt:
             run = dataclasses.replace(run, interrupted=True)
             unstored = [
                 name for name, item in judged.items() if item.verdict is RegressVerdict.CREATED and not item.message
             ]
             judged = {name: item for name, item in judged.items() if name not in unstored}
-    ended = [judged.get(scenario.name) or _unjudged(scenario.name, result) for scenario, result in ran]
-    ended += [_unjudged(result.name, result) for result in selection.failed]
+    ended = [judged.get(scenario.name) or unjudged(scenario.name, result) for scenario, result in ran]
+    ended += [judge.failed(result) for result in selection.failed]
     ended += [Judged(name, RegressVerdict.SKIPPED, why) for name, why in selection.skipped.items()]
     ended = [dataclasses.replace(item, source=str(selection.sources[item.name])) for item in ended]
     unused = _unused(selection, accepted, {item.name for item in ended})
@@ -153,9 +161,9 @@ def _renamed(item: Judged, accepted: Baseline, unused: Sequence[str]) -> Judged:
 def _forget(directory: Path, names: Sequence[str], *, drawings: bool) -> None:
     """Remove an earlier night's reports and pictures, which would stand beside recordings of this one."""
     own = [name for name in names if not (directory / name).is_symlink()]
-    kinds = ("{name}.rrd", OVERLAY) if drawings else (OVERLAY,)
+    kinds = (*(("{name}.rrd",) if drawings else ()), OVERLAY, PAGE, PICTURE)
     shown = [directory / name / kind.format(name=name) for name in own for kind in kinds]
-    for file in (directory / JUNIT, directory / INDEX, *shown):
+    for file in (*(directory / report for report in REPORTS), *shown):
         with contextlib.suppress(OSError):
             file.unlink(missing_ok=True)
     shutil.rmtree(directory / _AGAIN, ignore_errors=True)
@@ -166,93 +174,6 @@ def _unused(selection: Selection, accepted: Baseline, told: set[str]) -> list[st
     sweeps = tuple(f"{name}[" for name in selection.invalid)
     names = accepted.names() if selection.of_folders else []
     return [name for name in names if name not in told and not name.startswith(sweeps)]
-
-
-def _judge(
-    name: str, result: CaseResult, baseline: Baseline, rules: Rules, missing: MissingBaseline, *, overlay: bool
-) -> Judged:
-    """Return the verdict of one scenario.
-
-    Args:
-        name: of the scenario.
-        result: of its run.
-        baseline: where its accepted recording may be.
-        rules: tolerances.
-        missing: what it is without one; `CREATED` says that one is still to be stored.
-        overlay: whether to write a recording that shows both runs when they differ.
-
-    Raises:
-        NoSpaceError: the disk is full.
-    """
-    if not result.status.recorded or result.recordings is None:
-        return _unjudged(name, result)
-    found = _compared(name, result, baseline, rules, missing, overlay=overlay)
-    if result.status is CaseStatus.BROKEN and found.verdict in _KNOWN:
-        broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
-        message = "; ".join([*broken, *([found.message] if found.message else [])])
-        return dataclasses.replace(found, verdict=RegressVerdict.BROKEN, message=message)
-    return found
-
-
-def _unjudged(name: str, result: CaseResult) -> Judged:
-    """Return the verdict of a scenario that has not been compared, because it failed or the run was ended."""
-    if result.status.recorded:
-        message = "the run was ended before it was compared"
-        return Judged(name, RegressVerdict.INTERRUPTED, message, result)
-    return Judged(name, RegressVerdict(result.status.value), result.error, result)
-
-
-def _compared(
-    name: str, result: CaseResult, baseline: Baseline, rules: Rules, missing: MissingBaseline, *, overlay: bool
-) -> Judged:
-    assert result.recordings is not None
-    accepted, candidate = baseline.recording(name), result.recordings.mcap
-    if accepted is None:
-        verdicts = {"fail": RegressVerdict.MISSING, "create": RegressVerdict.CREATED, "skip": RegressVerdict.UNCOMPARED}
-        message = "" if missing == "create" else f"{baseline.directory} holds no baseline of it"
-        return Judged(name, verdicts[missing], message, result)
-    try:
-        pair = read_pair(accepted, candidate, rules=rules)
-        found = diff_pair(pair, rules=rules)
-    except RecordingError as error:
-        ours = error.file == str(candidate)
-        verdict = RegressVerdict.FAILED if ours else RegressVerdict.UNREADABLE
-        return Judged(name, verdict, f"its own recording: {error}" if ours else str(error), result)
-    except Exception as error:
-        return Judged(
-            name, RegressVerdict.FAILED, _odd("it cannot be compared with its baseline", error, candidate), result
-        )
-    comparison = Case(name, accepted, candidate, found)
-    if found.verdict is not DiffVerdict.DIFFERENT:
-        return Judged(name, RegressVerdict.SAME, "", result, comparison)
-    message = wording.summary(found)
-    item = Judged(name, RegressVerdict.DIFFERENT, message, result, comparison)
-    try:
-        item = dataclasses.replace(item, drawings=plots(found, pair))
-    except Exception as error:
-        item = dataclasses.replace(item, message=f"{message}; {_odd('it cannot be drawn', error, candidate)}")
-    return dataclasses.replace(item, message=item.message + _overlay(comparison, pair)) if overlay else item
-
-
-def _overlay(comparison: Case, pair: RecordingPair) -> str:
-    """Write the recording that shows both runs; return what to add to the message when that is not possible."""
-    try:
-        write_overlay(comparison.candidate.with_name(OVERLAY.format(name=comparison.name)), comparison, pair)
-    except NoSpaceError:
-        raise
-    except Exception as error:
-        return f"; {_odd('both runs cannot be shown', error, comparison.candidate)}"
-    return ""
-
-
-def _odd(what: str, error: Exception, candidate: Path) -> str:
-    """Return what went wrong as one line; of what nobody has foreseen, the log of the scenario gets the trace."""
-    if isinstance(error, ReplayError):
-        return str(error)
-    with contextlib.suppress(ReplayError):
-        trace = "".join(traceback.format_exception(error)).splitlines()
-        append_lines(candidate.with_name(LOG), map(printable, trace))
-    return f"{what}: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 class _Asked(Unwatched):

@@ -1,107 +1,117 @@
-"""A regression as one page: counts, then scenarios, failing ones first, each with what differs and how to see it."""
+"""A regression as one page: causes first, then scenarios, the worst first; what differs in one is a page of its own.
+
+The page holds every row, packed, and a script shows those that are asked for: it stays small and quick whatever the
+night. Without scripts it still tells the causes, with links to the first scenarios of each.
+"""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 import os
 import platform
-import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+import zlib
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
 from urllib.parse import quote
 
 import replay
-from replay.batch.case_folder import LOG
-from replay.batch.judged import OVERLAY, Judged, Regression, RegressVerdict
+from replay.batch.groups import CauseGroup, groups
+from replay.batch.history import Past
+from replay.batch.judged import PAGE, PICTURE, Judged, Regression, RegressVerdict
+from replay.batch.metrics import MAIN
+from replay.batch.sparkline import sparkline
 from replay.comparison import report_html
-from replay.errors import count
+from replay.comparison.effects import Severity
+from replay.errors import count, printable
 
-_FILES = ("{name}.mcap", "{name}.rrd", OVERLAY, LOG, "result.json")
 _ORDER = sorted(RegressVerdict, key=lambda verdict: verdict.fine)
-_LINES = 30
-"""Of a log that are shown on the page."""
-_OPEN = 3
-"""As many failing scenarios are shown open; more of them would hide one another."""
+_MESSAGE = 300
+"""Characters of a message that a row has room for; the scenario's page has all of it."""
+_FIRST, _LISTED = 10, 200
+"""Groups that are open to see, and that are listed at all; a night has few causes, or one for each scenario."""
 
 
-@dataclass(frozen=True)
-class IndexRow:
-    """One scenario on the page.
-
-    Attributes:
-        item: the scenario.
-        since: when the row of failing nights began; "" when this is the first.
-        links: text and address of its files.
-        command: what reproduces it, for a shell.
-        log: the end of what it said, when that is all that there is.
-    """
-
-    item: Judged
-    since: str
-    links: tuple[tuple[str, str], ...]
-    command: str
-    log: str
-
-
-def index(found: Regression, since: Mapping[str, str]) -> str:
-    """Return the page; it needs no other file, no network and no script.
+def index(found: Regression, past: Past) -> str:
+    """Return the page: it needs the scenarios' own pages when they are opened, no network, and no other file.
 
     Args:
         found: the regression.
-        since: when the row of failing nights began, by scenario.
+        past: what the nights before say.
     """
-    ordered = sorted(found.judged, key=lambda item: (_ORDER.index(item.verdict), item.name))
-    rows = [
-        IndexRow(item, since.get(item.name, ""), _links(found, item), command(found, item), _log(found, item))
-        for item in ordered
-    ]
-    failing = [row for row in rows if not row.item.verdict.fine]
+    ordered = sorted(found.judged, key=lambda item: item.order)
+    grouped = groups(ordered)
+    failing = sum(not item.verdict.fine for item in ordered)
+    script = resources.files("replay.batch").joinpath("index.js").read_text(encoding="utf-8")
     page: str = report_html.template("replay.batch", "index.html.j2").render(
         found=found,
-        rows=rows,
-        failing=len(failing),
+        groups=grouped[:_LISTED],
+        more=grouped[_LISTED:],
+        first=_FIRST,
+        address=address,
+        failing=failing,
+        total=len(ordered),
         counts=[(verdict, found.count(verdict)) for verdict in _ORDER if found.count(verdict)],
-        open=len(failing) <= _OPEN,
+        severities=[one for one in Severity if any(not i.verdict.fine and i.severity is one for i in ordered)],
+        tags=sorted({tag for item in ordered for tag in item.tags}),
+        data=_packed(_data(found, ordered, grouped, past)),
+        script=_markup(script),
+        allowed=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         count=count,
         style=report_html.style(),
-        details=report_html.details,
-        folder=Path.cwd(),
         version=replay.__version__,
         host=platform.node(),
     )
     return page
 
 
-def command(found: Regression, item: Judged) -> str:
-    """Return the command that runs and compares one scenario again."""
-    parts = ["replay", "regress", item.source, "--select", item.name]
-    parts += ["--baseline", str(found.baseline), "-o", "again"]
-    parts += [*(["--rules", found.rules] if found.rules else []), *(["--model", found.model] if found.model else [])]
-    return shlex.join(parts)
+def address(item: Judged, file: str = PAGE) -> str:
+    """Return the address of a scenario's page, or of another file of its, as seen from the night's."""
+    return f"{quote(os.fsencode(item.name))}/{file}"
 
 
-def _log(found: Regression, item: Judged) -> str:
-    if item.result is None or item.result.status.recorded:
-        return ""
-    log = found.run.directory / item.name / LOG
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.is_file() else []
-    return "\n".join(lines[-_LINES:])
+def _data(found: Regression, ordered: Sequence[Judged], grouped: Sequence[CauseGroup], past: Past) -> dict[str, Any]:
+    """Return what the script shows: lists of texts, and rows that refer to them by number."""
+    number = {item.name: k for k, group in enumerate(grouped) for item in group.members}
+    tags = sorted({tag for item in ordered for tag in item.tags})
+    rows = []
+    for item in ordered:
+        curve = [*past.curve(item.name), _value(item)]
+        rows.append(
+            [
+                printable(item.name),
+                address(item) if item.verdict is not RegressVerdict.SKIPPED else "",
+                _ORDER.index(item.verdict),
+                item.severity,
+                number.get(item.name, -1),
+                printable(item.message[:_MESSAGE]),
+                "" if item.verdict.fine else past.since.get(item.name, ""),
+                [tags.index(tag) for tag in item.tags],
+                address(item, PICTURE) if (found.run.directory / item.name / PICTURE).is_file() else "",
+                sparkline(curve) if len([value for value in curve if value is not None]) > 1 else "",
+            ]
+        )
+    return {
+        "verdicts": [[verdict.name, verdict.value, verdict.fine, verdict.left_out] for verdict in _ORDER],
+        "tags": tags,
+        "rows": rows,
+    }
 
 
-def _links(found: Regression, item: Judged) -> tuple[tuple[str, str], ...]:
-    folder = found.run.directory / item.name
-    names = [name.format(name=item.name) for name in _FILES]
-    home = quote(os.fsencode(item.name))
-    links = [(name, f"{home}/{quote(os.fsencode(name))}") for name in names if (folder / name).is_file()]
-    if item.comparison is not None:
-        links.append(("baseline", _address(Path(item.comparison.baseline).resolve(), found.run.directory.resolve())))
-    return tuple(links)
+def _value(item: Judged) -> float | None:
+    measures = item.result.measures if item.result is not None else ()
+    return next((measure.value for measure in measures if measure.name == MAIN), None)
 
 
-def _address(file: Path, folder: Path) -> str:
-    """Return a file's address as seen from a page in a folder, so that both can be moved together."""
-    try:
-        way = Path(os.path.relpath(file, folder))
-    except ValueError:  # it is on another drive
-        return file.as_uri()
-    return "/".join(quote(os.fsencode(part)) for part in way.parts)
+def _packed(data: dict[str, Any]) -> str:
+    """Return data as text that stands in a page as it is: JSON, deflated, in base 64."""
+    text = json.dumps(data, ensure_ascii=True, separators=(",", ":"))
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+
+
+def _markup(text: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup(text)  # a file of the package

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
-from pathlib import Path
 from xml.etree import ElementTree
 
 import replay
+from replay.batch.case_folder import said
 from replay.batch.judged import Judged, Regression, RegressVerdict
 from replay.comparison.report_junit import clean
-from replay.comparison.report_text import text
-from replay.comparison.runs import RunDifference
 from replay.errors import printable
 
 SUITE = "replay.regress"
@@ -77,7 +75,8 @@ def _case(suite: ElementTree.Element, found: Regression, item: Judged) -> None:
 
 
 def _details(found: Regression, item: Judged) -> str:
-    if item.comparison is not None and item.verdict is RegressVerdict.DIFFERENT:
-        return text(RunDifference(str(found.baseline), str(found.run.directory), (item.comparison,)))
-    log = Path(found.run.directory) / item.name / "log.txt"
-    return "\n".join([item.message, *(log.read_text(errors="replace").splitlines()[-50:] if log.is_file() else [])])
+    if item.finding is not None and item.finding.report and item.verdict is RegressVerdict.DIFFERENT:
+        return item.finding.report
+    if item.finding is not None and item.finding.effects:
+        return "\n".join([item.message, *map(str, item.finding.effects), f"cause: {item.finding.causes.name}"])
+    return "\n".join([item.message, *said(found.run.directory / item.name)[-50:]])

@@ -1,4 +1,4 @@
-"""The files of a regression: junit.xml, index.html, run.json, and a line of history."""
+"""The files of a regression: junit.xml, index.html, summary.md, metrics.parquet, run.json, and a line of history."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import replay
-from replay.batch.history import Night, append_night, failing_since, read_history
-from replay.batch.judged import INDEX, JUNIT, Regression, verdicts
+from replay.batch.accepted import last_accepted
+from replay.batch.groups import groups
+from replay.batch.history import Night, Past, append_night, nights
+from replay.batch.judged import INDEX, JUNIT, METRICS, SUMMARY, Regression, verdicts
+from replay.batch.metrics import MAIN, for_history, write_metrics
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
+from replay.batch.report_summary import summary
 from replay.batch.run_file import as_json
 from replay.comparison.run_folder import RUN
 from replay.errors import count
@@ -32,16 +36,15 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
     """
     named, history = history is not None, history or found.run.directory / HISTORY
     problems: list[Exception] = []
-    nights: list[Night] = []
+    past = Past((), MAIN)
     with _kept(problems):  # the night itself is not lost for its history
-        nights = read_history(history)
+        past = Past(nights(history, MAIN.__eq__), MAIN)
     readable = not problems
     failing = frozenset(item.name for item in found.judged if not item.verdict.fine)
-    earlier = {name: failing_since(nights, name) for name in failing}
-    since = {name: time for name, time in earlier.items() if time is not None}
+    causes = {item.name: group.name for group in groups(found.judged) for item in group.members}
     started = found.run.started.isoformat(timespec="seconds")
     directory = found.run.directory
-    summary = {
+    told = {
         **as_json(found.run),
         "baseline": str(found.baseline),
         "rules": found.rules,
@@ -50,7 +53,11 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
             item.name: {
                 "verdict": item.verdict.value,
                 **({"message": item.message} if item.message else {}),
-                **({"since": since.get(item.name, started)} if item.name in failing else {}),
+                **({"cause": causes[item.name]} if item.name in causes else {}),
+                **({"finding": item.finding.as_json()} if item.finding is not None and item.finding.told_of else {}),
+                **({"tags": list(item.tags)} if item.tags else {}),
+                "source": item.source,
+                **({"since": past.since.get(item.name, started)} if item.name in failing else {}),
             }
             for item in found.judged
         },
@@ -59,12 +66,19 @@ def write_reports(found: Regression, *, history: Path | None = None) -> None:
     with _kept(problems):
         write_file(directory / JUNIT, junit(found))
     with _kept(problems):
-        write_file(directory / INDEX, index(found, since))
-    with _kept(problems):  # the last of the three: until it is there, the run counts as interrupted
-        write_file(directory / RUN, json.dumps(summary, indent=1) + "\n")
+        write_file(directory / INDEX, index(found, past))
+    with _kept(problems):
+        write_file(directory / SUMMARY, summary(found))
+    with _kept(problems):
+        write_metrics(directory / METRICS, found.run.results)
+    with _kept(problems):  # the last of them: until it is there, the run counts as interrupted
+        write_file(directory / RUN, json.dumps(told, indent=1) + "\n")
     if readable and not found.run.interrupted:
         with _kept(problems):
-            append_night(history, Night(started, replay.__version__, verdicts(found), failing), named=named)
+            numbers, units = for_history(found.run.results)
+            accepted = last_accepted(found.baseline)
+            night = Night(started, replay.__version__, verdicts(found), failing, numbers, accepted, units)
+            append_night(history, night, named=named)
     if problems:
         raise problems[0]
 

@@ -33,11 +33,14 @@ def earlier_result(
         savings: whether it is wanted with savings.
     """
     paths = RecordedPaths(folder / f"{scenario.name}.mcap", folder / f"{scenario.name}.rrd" if rrd else None)
-    for path in (paths.mcap, paths.rrd, folder / RESULT):
-        if path is not None and not path.is_file():
-            return f"there is no {path.name}"
-        if path is not None and (path.is_symlink() or folder.is_symlink()):
-            return f"{path.name} is a link, or in a folder that is one"
+    for path in (paths.mcap, *([paths.rrd] if paths.rrd else []), folder / RESULT):
+        try:
+            if not path.is_file():
+                return f"there is no {path.name}"
+            if path.is_symlink() or folder.is_symlink():
+                return f"{path.name} is a link, or in a folder that is one"
+        except OSError as error:
+            return f"{path.name} cannot be looked for: {error.strerror}"
     try:
         with McapLog(paths.mcap) as log:
             found = read_provenance(log)

@@ -182,8 +182,9 @@ def _settle(result: CaseResult, file: RunFile, directory: Path) -> None:
 def _refuse_existing(directory: Path, names: Sequence[str]) -> None:
     for name in names:
         for recording in (directory / name / f"{name}{kind}" for kind in KINDS):
-            if recording.exists():
-                raise RecordingExistsError(str(recording), resumable=True)
+            with contextlib.suppress(OSError):  # where it cannot be looked for, the scenario cannot be written either
+                if recording.exists():
+                    raise RecordingExistsError(str(recording), resumable=True)
 
 
 def _endings(

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from replay import limits
 from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.folders import look_through
 from replay.batch.shard import Shard
@@ -57,10 +58,16 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
 
 def _may_be_scenario(file: Path) -> bool:
     try:
-        data = file.read_bytes()
+        data = _beginning(file)
     except OSError:
         return True
     return _VERSION_KEY.search(data) is not None or is_lfs_pointer(data)
+
+
+def _beginning(file: Path) -> bytes:
+    """Return as much of a file as a YAML file may have; what is larger is none that is read."""
+    with file.open("rb") as stream:
+        return stream.read(limits.YAML_BYTES)
 
 
 def left_out(paths: Sequence[str | Path]) -> list[str]:
@@ -193,7 +200,7 @@ class Selection:
 def _name_in(path: Path, taken: Collection[str]) -> str:
     """Return the name that a file which is not valid gives its scenario; that of the file when it is none or taken."""
     try:
-        found = _NAME_KEY.search(path.read_bytes())
+        found = _NAME_KEY.search(_beginning(path))
     except OSError:
         found = None
     stem = path.stem.lstrip(".") or "scenario"  # the name of a folder, and no way to another one

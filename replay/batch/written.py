@@ -24,6 +24,19 @@ class WrittenOutcome(TypedDict):
     detail: str
 
 
+class WrittenMeasure(TypedDict):
+    """A number among the results; see `scenario.measures.Measure`."""
+
+    scenario: str
+    name: str
+    value: float | None
+    unit: str
+    time: float | None
+    subject: str
+    limit: float | None
+    margin: float | None
+
+
 class WrittenResult(TypedDict):
     """result.json."""
 
@@ -37,6 +50,7 @@ class WrittenResult(TypedDict):
     between_frames: NotRequired[list[str]]
     guards: NotRequired[list[dict[str, Any]]]
     reactions: NotRequired[list[str]]
+    results: NotRequired[list[WrittenMeasure]]
 
 
 class WrittenNight(TypedDict):
@@ -46,6 +60,9 @@ class WrittenNight(TypedDict):
     version: str
     verdicts: dict[str, str]
     failing: list[str]
+    accepted: NotRequired[str]
+    units: NotRequired[dict[str, str]]
+    results: NotRequired[dict[str, dict[str, float]]]
 
 
 def read_result(path: Path) -> WrittenResult:

@@ -70,6 +70,19 @@ class Row:
     note: str = ""
 
 
+def silent(case: str) -> None:
+    """Show nothing."""
+
+
+_tell: Callable[[str], None] = silent
+
+
+def tell_by(tell: Callable[[str], None]) -> None:
+    """Let others show which case is measured."""
+    global _tell  # noqa: PLW0603
+    _tell = tell
+
+
 LEAST_ROUND = 5e-4
 """[s] A contender that is faster is called several times a round; long rounds would all meet a pause of the machine."""
 
@@ -84,6 +97,7 @@ def compete(case: str, contenders: Sequence[Contender], *, rounds: int = 7) -> l
     Returns:
         one row a contender, in the order given; `low` and `high` are the fastest and slowest round.
     """
+    _tell(case)
     checks = [contender.check(contender.run()) for contender in contenders]
     calls = [max(1, math.ceil(LEAST_ROUND / max(_seconds(contender, 1), 1e-9))) for contender in contenders]
     times: list[list[float]] = [[] for _ in contenders]

@@ -38,6 +38,9 @@ def _section(report: Report) -> str:
         for plot in report.plots
     )
     notes = "".join(f"<p>{html.escape(note)}</p>" for note in report.notes)
+    if report.said:
+        said = html.escape("\n".join(report.said))
+        notes += f"<details><summary>said on standard error meanwhile</summary><pre>{said}</pre></details>"
     return f"<h2>{html.escape(report.name)}</h2>{tables}{pictures}{notes}"
 
 

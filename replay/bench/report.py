@@ -69,7 +69,11 @@ class Grid:
 
 @dataclass
 class Report:
-    """One run of a benchmark: tables of rows by title, goals, and plots."""
+    """One run of a benchmark: tables of rows by title, goals, plots, notes, and what was said on standard error.
+
+    Attributes:
+        seconds: what it took [s].
+    """
 
     name: str
     tables: dict[str, list[Row]] = field(default_factory=dict)
@@ -77,6 +81,8 @@ class Report:
     goals: list[Goal] = field(default_factory=list)
     plots: list[LogLogPlot] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+    seconds: float = 0.0
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as JSON values; NaN and infinities are written as null."""
@@ -85,6 +91,8 @@ class Report:
             "grids": {title: grid.lines for title, grid in self.grids.items()},
             "goals": [goal.as_json() for goal in self.goals],
             "notes": self.notes,
+            "said": self.said,
+            "seconds": round(self.seconds, 1),
         }
 
     def as_text(self) -> str:

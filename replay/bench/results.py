@@ -8,10 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import TypedDict
+
 from replay.bench import goals
 from replay.bench.page import page, png
 from replay.bench.report import Report, align, machine
+from replay.json_text import read_json_file, typed
 from replay.logs.part_file import write_file
+
+_JSON = "bench.json"
 
 
 def as_text(reports: Sequence[Report]) -> str:
@@ -55,13 +60,30 @@ def write(reports: Sequence[Report], directory: Path) -> list[Path]:
         WriteError: it cannot be written.
     """
     files = {
-        "bench.json": (json.dumps(as_json(reports), indent=1) + "\n").encode(),
+        _JSON: (json.dumps(as_json(reports), indent=1) + "\n").encode(),
         "bench.html": page(reports, facts(reports)).encode(),
     }
     headlines = [plot for report in reports for plot in report.plots if plot.headline]
     if headlines:
         files["bench.png"] = png(*headlines)
     return [write_file(directory / name, content) for name, content in files.items()]
+
+
+def earlier_seconds(directory: Path) -> dict[str, float]:
+    """Return what each benchmark took in the run whose report is in a folder [s]; none if there is no report."""
+    try:
+        found = typed(read_json_file(directory / _JSON), _Written)["benchmarks"]
+    except (OSError, ValueError):
+        return {}
+    return {name: report["seconds"] for name, report in found.items()}
+
+
+class _Timed(TypedDict):
+    seconds: float
+
+
+class _Written(TypedDict):
+    benchmarks: dict[str, _Timed]
 
 
 def _goals(reports: Sequence[Report]) -> list[goals.Goal]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from replay.batch.run import Execution, run_all
-from replay.bench import broad_phase
+from replay.bench import broad_phase, set_up
 from replay.bench.inputs import around, torus
 from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
 from replay.bench.pipeline import FAST, MODELS, scenario
@@ -59,6 +59,7 @@ def run(*, quick: bool = False, rounds: int | None = None, scene: Scenario | Non
     except ScenarioError as error:
         report.tables["frames"] = [absent("frames", FAST, str(error))]
     broad_phase.growth(report, most=1000 if quick else 10_000, rounds=rounds)
+    set_up.growth(report, sizes=set_up.TRIANGLES[: 2 if quick else None], rounds=rounds)
     _triangles(report, TRIANGLES[: 3 if quick else None], rounds)
     _sensors(report, SENSORS[: 3 if quick else None], rounds)
     report.grids["workers: scenarios of equal length, process start included"] = workers(

@@ -75,7 +75,8 @@ def signed_distance(a: Wide, b: Wide) -> float:
     gap = gaps.max(initial=-np.inf)
     if len(axes) and gap <= 0:
         return float(gap)
-    return float(min(_corners_to_faces(a, b), _corners_to_faces(b, a), _edges_to_edges(a, pairs_a, b, pairs_b)))
+    corners = [f(x, y) for f in (_corners_to_faces, _corners_to_edges) for x, y in ((a, b), (b, a))]
+    return float(min(*corners, _edges_to_edges(a, pairs_a, b, pairs_b)))
 
 
 def _choices(count: int, size: int) -> Integers:
@@ -114,6 +115,17 @@ def _corners_to_faces(points: Wide, corners: Wide) -> np.longdouble:
     return np.longdouble(best)
 
 
+def _corners_to_edges(points: Wide, corners: Wide) -> np.longdouble:
+    pairs = _choices(len(corners), 2)
+    if len(pairs) == 0:
+        return np.longdouble(np.inf)
+    way = _edges(corners, pairs)[None]
+    square = np.sum(way * way, axis=-1)
+    r = points[:, None] - corners[pairs[:, 0]][None]
+    along = np.clip(np.sum(r * way, axis=-1) / np.where(square > 0, square, 1), 0, 1)
+    return np.longdouble(np.sqrt(np.sum((r - along[..., None] * way) ** 2, axis=-1)).min())
+
+
 def _edges_to_edges(a: Wide, pairs_a: Integers, b: Wide, pairs_b: Integers) -> np.longdouble:
     if len(pairs_a) == 0 or len(pairs_b) == 0:
         return np.longdouble(np.inf)
@@ -127,7 +139,4 @@ def _edges_to_edges(a: Wide, pairs_a: Integers, b: Wide, pairs_b: Integers) -> n
         t = np.clip((uv * s + vr) / vv, 0, 1)
         s = np.clip((uv * t - ur) / uu, 0, 1)
     best = np.sum((r + s[..., None] * u - t[..., None] * v) ** 2, axis=-1).min()
-    for x, w, ww in ((-r, u, uu), (-r + v, u, uu), (r, v, vv), (r + u, v, vv)):  # ends against edges
-        along = np.clip(np.sum(x * w, axis=-1) / ww, 0, 1)
-        best = min(best, np.sum((x - along[..., None] * w) ** 2, axis=-1).min())
     return np.longdouble(np.sqrt(best))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import tempfile
 import time
 from pathlib import Path
 
 import click
 
+from replay.cli.diverted import diverted_stderr, lines_of
 from replay.cli.exit_codes import ExitCode
 from replay.cli.options import format_option, note, say
 from replay.cli.values import PathName
@@ -36,13 +38,22 @@ def bench(names: tuple[str, ...], quick: bool, output: Path, form: str) -> ExitC
     All benchmarks when none is named. Exit code 1: a goal is missed.
     """
     from replay.bench import results
+    from replay.cli.bench_progress import BenchProgress
 
+    names, before = names or BENCHMARKS, results.earlier_seconds(output)
     reports, paths = [], []
-    for name in names or BENCHMARKS:
-        begin = time.perf_counter()
-        reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
-        paths = results.write(reports, output)  # after each, so that an interruption loses none
-        note(f"bench {name}: {time.perf_counter() - begin:.0f} s")
+    with (
+        tempfile.TemporaryFile() as said,
+        diverted_stderr(said) as shown,
+        BenchProgress(names, before, shown) as progress,
+    ):
+        for name in names:
+            begin = time.perf_counter()
+            reports.append(importlib.import_module(f"replay.bench.{name}").run(quick=quick))
+            reports[-1].said = lines_of(said)
+            reports[-1].seconds = time.perf_counter() - begin
+            paths = results.write(reports, output)  # after each, so that an interruption loses none
+            progress.done(reports[-1].seconds)
     note(f"wrote {', '.join(map(str, paths))}")
     say(form, lambda: results.as_text(reports).splitlines(), lambda: results.as_json(reports))
     missed = any(goal.failed for report in reports for goal in report.goals)

@@ -20,6 +20,7 @@ from replay.cli.exit_codes import ExitCode
 from replay.errors import ReplayError
 
 COMMANDS = {
+    "new": "write a first scenario, to be read and changed",
     "run": "simulate scenarios and record them",
     "validate": "check scenarios without running them",
     "import": "make a part of a robot's description (URDF, SRDF)",
@@ -29,8 +30,11 @@ COMMANDS = {
     "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
+    "explain": "say why a reading is what it is at a moment",
     "regress": "run scenarios and compare each with its baseline",
+    "merge": "put the run folders of several shards into one night",
     "accept": "make a run's recordings the baseline",
+    "trend": "say how results went from night to night",
     "view": "show recordings in the rerun viewer, or make a picture",
     "bench": "time methods and peers on the same questions, and check their answers",
 }

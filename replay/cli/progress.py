@@ -1,4 +1,4 @@
-"""Progress of a run on stderr: live on a terminal, a line for each scenario elsewhere, such as in a nightly's log."""
+"""Progress of a run on stderr: live on a terminal; elsewhere, such as in a nightly's log, a line every few seconds."""
 
 from __future__ import annotations
 
@@ -91,9 +91,16 @@ class RunProgress:
             self._bars.remove_task(self._running.pop(result.name))
         self._bars.update(self._all, completed=self._done)
         if not self._console.is_terminal and len(self._costs) > 1:
+            self._line(result)
+        self._show()
+
+    def _line(self, result: CaseResult) -> None:
+        """Tell of a scenario that fails and of the last one; of others at most one line in five seconds."""
+        failed, last = result.status.value != "passed", self._done == len(self._costs)
+        if failed or last or time.monotonic() >= self._next_line:
+            self._next_line = time.monotonic() + _SECONDS_BETWEEN_LINES
             state = f"{result.name}: {result.status.value} in {result.seconds:.1f} s"
             self.tell(f"[{self._done}/{len(self._costs)}] {state}{self._left()}")
-        self._show()
 
     def compare(self, name: str) -> None:
         """Show which scenario is compared."""

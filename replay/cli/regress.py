@@ -10,10 +10,10 @@ import click
 
 from replay.cli import options
 from replay.cli.exit_codes import ExitCode
-from replay.cli.values import PathName
+from replay.cli.values import PathName, RrdOf
 
 MISSING: Any = {"type": click.Choice(["fail", "create", "skip"]), "default": "fail", "show_default": True}
-RRD: Any = {"type": click.Choice(["failing", "all", "none"]), "default": "failing", "show_default": True}
+RRD: Any = {"type": RrdOf(), "default": "failing", "show_default": True, "metavar": "failing[:N]|all|none"}
 
 
 @click.command()
@@ -22,7 +22,8 @@ RRD: Any = {"type": click.Choice(["failing", "all", "none"]), "default": "failin
 @options.output_option("regress")
 @click.option("--rules", type=PathName(), help="Tolerances; rules.yaml beside SCENARIOS when left out.")
 @click.option("--missing-baseline", "missing", **MISSING, help="What a scenario without one is.")
-@click.option("--rrd", **RRD, help="Scenarios to record for eyes.")
+@click.option("--rrd", **RRD, help="Scenarios to record for eyes; failing:20 are the worst 20.")
+@click.option("--pictures", type=click.IntRange(0, 100), default=0, metavar="N", help="Render the N worst moments.")
 @click.option("--history", type=PathName(), help="File that each night appends to; OUTPUT/history.jsonl when left out.")
 @click.option("--resume", is_flag=True, help="Carry on a night that was cut: keep results that are up to date.")
 @options.model_option
@@ -39,7 +40,7 @@ def regress(
     shard: Any,
     **how: Any,
 ) -> ExitCode:
-    """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and run.json into OUTPUT.
+    """Run SCENARIOS, compare them with their baselines, and write junit.xml, index.html and more into OUTPUT.
 
     Exit codes: 1 different; 2 invalid or unreadable; 4 failed or without a baseline; 130 interrupted (partial reports).
     """
@@ -58,7 +59,7 @@ def regress(
     rules = rules or rules_beside(scenarios)
     settings |= {"rules": read_rules(rules, today=datetime.date.today()) if rules else None}
     settings |= {"rules_file": str(rules or ""), "model_name": how["model"] or "", "history": history}
-    settings |= {name: how[name] for name in ("missing", "rrd", "resume")}
+    settings |= {name: how[name] for name in ("missing", "rrd", "pictures", "resume")}
     with claim(output):
         with RunProgress() as watch:
             found = judge(selection, output, baseline, watch=watch, **settings)

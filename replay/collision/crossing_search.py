@@ -21,7 +21,7 @@ from replay.collision import traversal
 from replay.collision.bodies import AABB, BODIES_TYPE, OBB, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import volumes_meet
 from replay.collision.directed import Lines, lines, measure_changes, write_lines
-from replay.collision.gjk_exact import SEPARATED, UNDECIDED, Workspace, workspace
+from replay.collision.gjk_exact import SEPARATED, UNDECIDED, Workspace, precise_points, workspace
 from replay.collision.gjk_kernel import ROUNDING
 from replay.collision.narrow import hold_each_other
 from replay.collision.piece_proof import Ends, apart_by_pieces, apart_in_world, ends, sets_apart, write_end
@@ -42,7 +42,7 @@ from replay.collision.way_steps import (
 )
 from replay.kinematics.timeline import TIMELINE_TYPE, Timeline, last_at_or_before
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import entry, kernel, leaf_kernel, record
+from replay.numerics.jit import kernel, leaf_kernel, rare_entry, record
 
 LOOKS = 1024
 """Cap of a search: moments looked at. What is left then is undecided."""
@@ -94,6 +94,7 @@ class Search(NamedTuple):
     """What a search asks GJK with, and the moments that it waits to deal with."""
 
     work: Workspace
+    precise: Floats  # (4, 3, 2)
     nodes: Integers
     gaps: Floats
     seed: Integers
@@ -113,6 +114,7 @@ class Search(NamedTuple):
 def _search(links: int, corners: Sets, counts: Integers) -> Search:
     return Search(
         workspace(),
+        precise_points(),
         np.empty((STACK, 2), np.int64),
         np.empty(STACK),
         np.empty((7, 2), np.int64),
@@ -129,7 +131,7 @@ def _search(links: int, corners: Sets, counts: Integers) -> Search:
     )
 
 
-@kernel
+@leaf_kernel
 def look(
     bodies: Bodies,
     volumes: Volumes,
@@ -167,7 +169,7 @@ def look(
         for j in range(3):
             r.rotation[i, j] = pose[i, j]
     status, distance = closest(
-        bodies, a, b, r.rotation, r.translation, limit, r.seed, r.work, r.nodes, r.gaps, r.counts
+        bodies, a, b, r.rotation, r.translation, limit, r.seed, r.work, r.precise, r.nodes, r.gaps, r.counts
     )
     # surfaces that are apart may still hold each other, where their volumes meet
     held = status == SEPARATED and (bodies.surface[a] or bodies.surface[b])
@@ -185,7 +187,7 @@ def proven_distance(distance: float, size: float) -> float:
     return distance * PROVEN_SHARE - PROVEN_ROUNDING * size
 
 
-@kernel
+@leaf_kernel
 def _by_pieces(
     bodies: Bodies,
     volumes: Volumes,
@@ -222,8 +224,13 @@ def _by_pieces(
         if in_world:
             return float(apart_in_world(r.corners, a, b, n, slack, s, r.lines))
         pad = 0.0 if volumes.kind == OBB else volumes.radius[a] + volumes.radius[b]
-        return float(sets_apart(r.corners, a, b, pad, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.counts))
-    return float(apart_by_pieces(bodies, a, b, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.counts))
+        bound = sets_apart(
+            r.corners, a, b, pad, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.precise, r.counts
+        )
+        return float(bound)
+    return float(
+        apart_by_pieces(bodies, a, b, way, split, n, size, slack, s, r.lines, r.ends, r.work, r.precise, r.counts)
+    )
 
 
 @leaf_kernel
@@ -246,7 +253,7 @@ def _key_frame(line: Timeline, n: int, t0: int, t1: int, s: Scratch) -> int:
     return -1
 
 
-@kernel
+@leaf_kernel
 def sweep(
     bodies: Bodies,
     volumes: Volumes,
@@ -330,7 +337,7 @@ def sweep(
     return PROVEN, bound
 
 
-@entry(
+@rare_entry(
     BODIES_TYPE,
     VOLUMES_TYPE,
     SETS_TYPE,
@@ -376,6 +383,26 @@ def search(
     for row in range(len(chains.first) - 1):
         longest = max(longest, chains.first[row + 1] - chains.first[row])
     s, wide, r = way_scratch(longest), way_scratch(longest), _search(longest, corners, counts)
+    return int(_answer(bodies, volumes, line, chains, q, cap, resolution, between, bound, events, s, wide, r))
+
+
+@leaf_kernel
+def _answer(
+    bodies: Bodies,
+    volumes: Volumes,
+    line: Timeline,
+    chains: Chains,
+    q: Questions,
+    cap: float,
+    resolution: int,
+    between: Bytes,
+    bound: Floats,
+    events: Integers,
+    s: Scratch,
+    wide: Scratch,
+    r: Search,
+) -> int:
+    """Do what `search` does, in arrays that it has made."""
     written = 0
     for k in range(len(q.doubt)):
         a, b, t0, t1 = q.bodies[k, 0], q.bodies[k, 1], q.time[k, 0], q.time[k, 1]

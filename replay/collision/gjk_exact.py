@@ -21,6 +21,8 @@ from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
 SEPARATED = 0
 CONTACT = 1
 UNDECIDED = 2
+LEFT = 3
+"""What a query ends with; LEFT: doubles do not decide it, and nothing else was wanted."""
 
 ITERATIONS = 128
 """Cap of the loop; the hardest case seen (two 642-vertex spheres, gap 1e-14) needs 22. Reaching it is UNDECIDED."""
@@ -61,13 +63,18 @@ class Workspace(NamedTuple):
     points: Floats  # (4, 3)
     weights: Floats  # (4,)
     result: Floats  # (16,), see DISTANCE..EXACT
-    precise: Floats  # (4, 3, 2)
 
 
 @kernel
 def workspace() -> Workspace:
     """Return fresh scratch for queries."""
-    return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16), np.zeros((4, 3, 2)))
+    return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16))
+
+
+@kernel
+def precise_points() -> Floats:
+    """Return scratch (4, 3, 2) for `refine`: the points of a simplex in double-doubles."""
+    return np.zeros((4, 3, 2))
 
 
 @inlined_kernel
@@ -182,10 +189,10 @@ def refine(
     size: float,
     cutoff: float,
     work: Workspace,
+    points: Floats,
 ) -> int:
-    """Decide a query in double-doubles, starting from the simplex in `work`; arguments as `gjk_kernel.query`."""
+    """Decide a query in double-doubles, from the simplex in `work`; arguments as `gjk_kernel.query`, and scratch."""
     simplex, weights, result = work.simplex, work.weights, work.result
-    points = work.precise
     n = simplex[4, 0]
     for k in range(n):
         _point(points, k, a, simplex[k, 0], b, simplex[k, 1], rotation, translation)

@@ -34,6 +34,7 @@ from replay.collision.gjk_exact import (
     DIRECTION,
     DISTANCE,
     EXACT,
+    LEFT,
     LOWER,
     SEPARATED,
     STEPS,
@@ -71,8 +72,9 @@ def query(
     cutoff: float,
     slack: float,
     work: Workspace,
+    precise: Floats | None,
 ) -> int:
-    """Decide whether set_a of body a and set_b of body b meet; return SEPARATED, CONTACT or UNDECIDED.
+    """Decide whether set_a of body a and set_b of body b meet; return SEPARATED, CONTACT, UNDECIDED or LEFT.
 
     Args:
         a, set_a: body and set within it.
@@ -83,6 +85,8 @@ def query(
         cutoff: a proof that the distance is larger ends the search; 0 for a boolean, inf for the distance [m].
         slack: duality gap accepted besides the relative one [m]; 0 asks for every digit.
         work: scratch; `work.result` holds the outcome, witness points only where the distance was asked for.
+        precise: scratch of `gjk_exact.refine`, which decides what doubles do not; None leaves it, and is compiled
+            without `refine`, which is as large as all the rest and seldom needed.
     """
     simplex, points, weights, result = work.simplex, work.points, work.weights, work.result
     # the simplex of an earlier answer, in this pose
@@ -155,7 +159,9 @@ def query(
         points[n, 0], points[n, 1], points[n, 2] = w
         n += 1
         simplex[4, 0] = n
-    return refine(a, set_a, b, set_b, rotation, translation, size, cutoff, work)
+    if precise is None:
+        return LEFT
+    return refine(a, set_a, b, set_b, rotation, translation, size, cutoff, work, precise)
 
 
 @inlined_kernel

@@ -21,6 +21,7 @@ from replay.collision.gjk_exact import (
     POINT_B,
     SEPARATED,
     Workspace,
+    precise_points,
     workspace,
 )
 from replay.collision.gjk_kernel import query
@@ -69,11 +70,10 @@ def ask(a: Floats, b: Floats, pose_a: Floats, pose_b: Floats, cutoff: float, ans
     _place(b, pose_b, half, -1.0, placed_b)
     largest = _center(placed_a, placed_b, shift)
     scale = 2.0 ** math.frexp(largest)[1] if largest > 0.0 else 1.0
-    work = workspace()
+    work, precise = workspace(), precise_points()
     size = 2.0 * math.sqrt(3.0)  # every coordinate is below 1
-    status = query(
-        _single(placed_a, scale), 0, _single(placed_b, scale), 0, np.identity(3), np.zeros(3), size, cutoff, 0.0, work
-    )
+    one, other = _single(placed_a, scale), _single(placed_b, scale)
+    status = query(one, 0, other, 0, np.identity(3), np.zeros(3), size, cutoff, 0.0, work, precise)
     _to_world(work, status, cutoff, scale, origin, shift, answer)
     return status
 
@@ -192,7 +192,7 @@ def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status
         status: (n,) out.
         distance: (n,) out [m]: 0 unless SEPARATED, a lower bound above a finite cutoff.
     """
-    work = workspace()
+    work, precise = workspace(), precise_points()
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for k in range(len(T_a_b)):
         square = 0.0
@@ -202,5 +202,5 @@ def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status
             for j in range(3):
                 rotation[i, j] = T_a_b[k, i, j]
         work.simplex[4, 0] = 0
-        status[k] = query(a, 0, b, 0, rotation, translation, reach + math.sqrt(square), cutoff, 0.0, work)
+        status[k] = query(a, 0, b, 0, rotation, translation, reach + math.sqrt(square), cutoff, 0.0, work, precise)
         distance[k] = work.result[DISTANCE] if status[k] == SEPARATED else 0.0

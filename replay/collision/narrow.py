@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import float64, int64
+from numba import float64, int64, uint8
 
 from replay.collision import traversal
 from replay.collision.bodies import BODIES_TYPE, Bodies
-from replay.collision.gjk_exact import CONTACT, SEPARATED, UNDECIDED, workspace
+from replay.collision.gjk_exact import CONTACT, LEFT, SEPARATED, UNDECIDED, Workspace, precise_points, workspace
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, PairFrames
 from replay.collision.traversal import STACK, closest, contains_part
-from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import entry, kernel, leaf_kernel
+from replay.numerics.arrays import Bytes, Floats, Integers
+from replay.numerics.jit import entry, kernel, leaf_kernel, rare_entry
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
@@ -19,10 +21,11 @@ RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
 contacts, and pair-frames that stayed undecided."""
 
 
-@entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, int64[::1])
-@kernel
 def decide(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -> None:
     """Finish the level, clearance and undecided of pairs in frames where their task asks for it.
+
+    Nearly all is decided by GJK in doubles; what else it takes is as much code again, which few scenes call: kernels of
+    their own, compiled when they are called first.
 
     Args:
         bodies: of the scene.
@@ -30,21 +33,109 @@ def decide(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -
         limit: clearances above it are left NaN [m]; 0 leaves all of them NaN.
         counts: (COUNTS,) added to.
     """
-    work = workspace()
-    nodes, gaps, seed = np.empty((STACK, 2), np.int64), np.empty(STACK), np.empty((7, 2), np.int64)
+    left = np.ones(len(frames.pairs), np.uint8)
+    held = np.zeros(frames.task.shape, np.uint8)
+    decide_by_doubles(bodies, frames, limit, left, held, counts)
+    if left.any():
+        decide_all(bodies, frames, limit, left, held, counts)
+    if held.any():
+        look_inside(bodies, frames, limit, held, counts)
+
+
+_DECIDES = (BODIES_TYPE, PAIR_FRAMES_TYPE, float64, uint8[::1], uint8[:, ::1], int64[::1])
+
+
+@entry(*_DECIDES)
+@kernel
+def decide_by_doubles(
+    bodies: Bodies, frames: PairFrames, limit: float, left: Bytes, held: Bytes, counts: Integers
+) -> None:
+    """Decide pairs as far as doubles do.
+
+    Args:
+        bodies, frames, limit, counts: as `decide` has them.
+        left: (P,) which pairs to decide; 0 from then on for those that are.
+        held: (n, P) out: 1 where surfaces are apart and may still hold each other.
+    """
+    s = _scratch(counts)
+    for p in range(len(frames.pairs)):
+        if left[p] and _decide_pair(bodies, frames, p, limit, held, s, None):
+            left[p] = 0
+            counts += s.counts
+
+
+@rare_entry(*_DECIDES)
+@kernel
+def decide_all(bodies: Bodies, frames: PairFrames, limit: float, left: Bytes, held: Bytes, counts: Integers) -> None:
+    """Decide pairs that are `left`, by double-doubles where doubles do not; arguments as `decide_by_doubles`."""
+    s, precise = _scratch(counts), precise_points()
+    for p in range(len(frames.pairs)):
+        if left[p]:
+            _decide_pair(bodies, frames, p, limit, held, s, precise)
+            counts += s.counts
+
+
+@rare_entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, uint8[:, ::1], int64[::1])
+@kernel
+def look_inside(bodies: Bodies, frames: PairFrames, limit: float, held: Bytes, counts: Integers) -> None:
+    """Call surfaces that hold each other in contact; arguments as `decide_by_doubles`, after it."""
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(frames.pairs)):
-        seed[0, 0], seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
-        for f in range(frames.task.shape[0]):
-            if is_asked_for(frames, f, p, rotation, translation):
-                a, b = frames.pairs[p, 0], frames.pairs[p, 1]
-                status, distance = closest(bodies, a, b, rotation, translation, limit, seed, work, nodes, gaps, counts)
-                # surfaces that are apart may still hold each other, where their volumes meet
-                held = status == SEPARATED and frames.level[f, p] > 0 and (bodies.surface[a] or bodies.surface[b])
-                if held and hold_each_other(bodies, a, b, rotation, translation):
-                    status, distance = CONTACT, 0.0
+        if held[:, p].any():
+            a, b = frames.pairs[p, 0], frames.pairs[p, 1]
+            for f in range(frames.task.shape[0]):
+                asked = is_asked_for(frames, f, p, rotation, translation) and held[f, p] == 1
+                if asked and hold_each_other(bodies, a, b, rotation, translation):
+                    counts[RUNS] -= 1  # it was counted when it was decided
                     counts[SEEN_INSIDE] += 1
-                write_found(frames, f, p, status, distance, limit, counts)
+                    write_found(frames, f, p, CONTACT, 0.0, limit, counts)
+
+
+class _Scratch(NamedTuple):
+    """What a pair is decided with, and the counters of the one at hand."""
+
+    work: Workspace
+    nodes: Integers
+    gaps: Floats
+    seed: Integers
+    rotation: Floats
+    translation: Floats
+    counts: Integers
+
+
+@kernel
+def _scratch(counts: Integers) -> _Scratch:
+    return _Scratch(
+        workspace(),
+        np.empty((STACK, 2), np.int64),
+        np.empty(STACK),
+        np.empty((7, 2), np.int64),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.zeros_like(counts),
+    )
+
+
+@leaf_kernel
+def _decide_pair(
+    bodies: Bodies, frames: PairFrames, p: int, limit: float, held: Bytes, s: _Scratch, precise: Floats | None
+) -> bool:
+    """Decide a pair in all frames of its task; return False, with nothing of use written, where it is left."""
+    a, b = frames.pairs[p, 0], frames.pairs[p, 1]
+    s.counts[:] = 0
+    s.seed[0, 0], s.seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
+    for f in range(frames.task.shape[0]):
+        if is_asked_for(frames, f, p, s.rotation, s.translation):
+            status, distance = closest(
+                bodies, a, b, s.rotation, s.translation, limit, s.seed, s.work, precise, s.nodes, s.gaps, s.counts
+            )
+            if status == LEFT:
+                return False
+            # surfaces that are apart may still hold each other, where their volumes meet
+            if status == SEPARATED and frames.level[f, p] > 0 and (bodies.surface[a] or bodies.surface[b]):
+                held[f, p] = 1
+            write_found(frames, f, p, status, distance, limit, s.counts)
+    return True
 
 
 @leaf_kernel

@@ -69,6 +69,7 @@ def apart_by_pieces(
     d: Lines,
     e: Ends,
     work: Workspace,
+    precise: Floats,
     counts: Integers,
 ) -> float:
     """Return a proven lower bound on the distance of two bodies over an interval [m]; not above 0 where none is proven.
@@ -116,7 +117,7 @@ def apart_by_pieces(
             return 0.0
         set_a = bodies.set_first[a] + bodies.tree.order[bodies.set_first[a] + bodies.tree.begin[row_i]]
         set_b = bodies.set_first[b] + bodies.tree.order[bodies.set_first[b] + bodies.tree.begin[row_j]]
-        apart = sets_apart(bodies.sets, set_a, set_b, 0.0, way, split, n, size, slack, s, d, e, work, counts)
+        apart = sets_apart(bodies.sets, set_a, set_b, 0.0, way, split, n, size, slack, s, d, e, work, precise, counts)
         if not apart > 0.0:
             return 0.0
         bound = min(bound, apart)
@@ -138,6 +139,7 @@ def sets_apart(
     d: Lines,
     e: Ends,
     work: Workspace,
+    precise: Floats,
     counts: Integers,
 ) -> float:
     """Return what `apart_by_pieces` does, of two convex sets that are thicker by `pad` together [m]."""
@@ -145,9 +147,8 @@ def sets_apart(
     rounding = 2.0 * ROUNDING * size
     for end in range(2):
         work.simplex[4, 0] = 0
-        status = query(
-            sets, set_a, sets, set_b, e.rotation[end], e.translation[end], size, way + 2.0 * pad, rounding, work
-        )
+        rotation, translation, cutoff = e.rotation[end], e.translation[end], way + 2.0 * pad
+        status = query(sets, set_a, sets, set_b, rotation, translation, size, cutoff, rounding, work, precise)
         counts[QUERIES] += 1
         if status != SEPARATED:
             return 0.0

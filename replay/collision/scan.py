@@ -8,7 +8,17 @@ import numpy as np
 from numba import float64, int64
 
 from replay.collision.bodies import BODIES_TYPE, Bodies
-from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, SEPARATED, STEPS, UNDECIDED, Workspace, workspace
+from replay.collision.gjk_exact import (
+    CONTACT,
+    DISTANCE,
+    EXACT,
+    SEPARATED,
+    STEPS,
+    UNDECIDED,
+    Workspace,
+    precise_points,
+    workspace,
+)
 from replay.collision.gjk_kernel import ROUNDING, query
 from replay.collision.narrow import SEEN_INSIDE, hold_each_other, is_asked_for, write_found
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
@@ -26,6 +36,7 @@ def closest_of_all(
     translation: Floats,
     limit: float,
     work: Workspace,
+    precise: Floats,
     counts: Integers,
 ) -> tuple[int, float]:
     """Return what `traversal.closest` returns; arguments as there. A contact is the only early end."""
@@ -36,7 +47,9 @@ def closest_of_all(
     for set_a in range(bodies.set_first[a], bodies.set_first[a + 1]):
         for set_b in range(bodies.set_first[b], bodies.set_first[b + 1]):
             work.simplex[4, 0] = 0
-            status = query(bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work)
+            status = query(
+                bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work, precise
+            )
             counts[QUERIES] += 1
             counts[ITERATIONS] += int(work.result[STEPS])
             counts[IN_DOUBLE_DOUBLE] += int(work.result[EXACT])
@@ -55,13 +68,13 @@ def closest_of_all(
 @kernel
 def decide_without_savings(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -> None:
     """Do as `narrow.decide`, by every convex set of one body against all of the other, from no earlier answer."""
-    work = workspace()
+    work, precise = workspace(), precise_points()
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(frames.pairs)):
         for f in range(frames.task.shape[0]):
             if is_asked_for(frames, f, p, rotation, translation):
                 a, b = frames.pairs[p, 0], frames.pairs[p, 1]
-                status, distance = closest_of_all(bodies, a, b, rotation, translation, limit, work, counts)
+                status, distance = closest_of_all(bodies, a, b, rotation, translation, limit, work, precise, counts)
                 # surfaces that are apart may still hold each other, where their volumes meet
                 held = status == SEPARATED and frames.level[f, p] > 0 and (bodies.surface[a] or bodies.surface[b])
                 if held and hold_each_other(bodies, a, b, rotation, translation):

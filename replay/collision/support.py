@@ -18,6 +18,7 @@ from numba import float64, int64
 
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, inlined_kernel, kernel, record
+from replay.numerics.kept import kept
 
 FEW = 16
 """Sets of so many vertices or fewer are looked at vertex by vertex: as fast as finding the cell."""
@@ -73,10 +74,10 @@ def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets
     for k in np.flatnonzero(counts > FEW) if tables else ():
         begin, end = first[k], first[k + 1]
         margin[k] = MARGIN * float(np.abs(vertices[begin:end]).max())
-        starts, listed = _table(flat, begin, end, margin[k])
+        starts, listed = _table(flat[3 * begin : 3 * end], float(margin[k]))
         side[k], table[k] = round(np.sqrt(len(starts) // 8)), cell_count
         cells.append(starts + candidate_count)
-        candidates.append(listed)
+        candidates.append(listed + begin)
         cell_count, candidate_count = cell_count + len(starts), candidate_count + len(listed)
     none = [np.zeros(0, dtype=np.int64)]
     return Sets(
@@ -92,15 +93,20 @@ def make_sets(vertices: Floats, first: Integers, *, tables: bool = True) -> Sets
     )
 
 
-def _table(flat: Floats, begin: int, end: int, margin: float) -> tuple[Integers, Integers]:
-    """Return the starts (8 N N + 1,) of each cell's list and the lists, of vertex rows begin:end."""
-    side, starts, listed = 0, np.array([0, end - begin], dtype=np.int64), np.arange(begin, end, dtype=np.int64)
-    while side < 8 or (3 * side * side < end - begin and side < 64):
+@kept
+def _table(flat: Floats, margin: float) -> tuple[Integers, Integers]:
+    """Return the starts (8 N N + 1,) of each cell's list and the lists, of the rows of v vertices (3 v,)."""
+    vertices = len(flat) // 3
+    side, starts, listed = 0, np.array([0, vertices], dtype=np.int64), np.arange(vertices, dtype=np.int64)
+    while side < 8 or (3 * side * side < vertices and side < 64):
         side = max(1, 2 * side)
         finer = np.empty(8 * side * side + 1, dtype=np.int64)
-        found = np.empty(_list_cells(flat, side, margin, starts, listed, finer, listed[:0]), dtype=np.int64)
-        _list_cells(flat, side, margin, starts, listed, finer, found)
-        starts, listed = finer, found
+        found = np.empty(2 * len(listed) + 64 * side * side, dtype=np.int64)  # more are listed where many are alike
+        count = _list_cells(flat, side, margin, starts, listed, finer, found)
+        if count > len(found):
+            found = np.empty(count, dtype=np.int64)
+            _list_cells(flat, side, margin, starts, listed, finer, found)
+        starts, listed = finer, found[:count]
     return starts, listed
 
 
@@ -114,6 +120,7 @@ def _list_cells(
     `starts` and `listed` are those of half the side, or one list for all cells of side 1.
     """
     count, half = 0, side // 2
+    least = np.empty((4, 4))  # directions to a cell's corners, and how high is high enough
     for cell in range(8 * side * side):
         octant, row, column = cell // (side * side), cell // side % side, cell % side
         finer[cell] = count
@@ -126,15 +133,20 @@ def _list_cells(
             height = _height(flat, listed[e], x, y, z)
             if height > top:
                 top, best = height, listed[e]
+        corners = 0
+        for corner in range(4):
+            u, v = row + corner % 2, column + corner // 2
+            if u + v <= side:
+                x, y, z = _direction(octant, u / side, v / side)
+                least[corners, 0], least[corners, 1], least[corners, 2] = x, y, z
+                least[corners, 3] = _height(flat, best, x, y, z) - margin
+                corners += 1
         for e in range(starts[parent], starts[parent + 1]):
             i = listed[e]
             kept = False
-            for corner in range(4):
-                u, v = row + corner % 2, column + corner // 2
-                if u + v > side:
-                    continue
-                x, y, z = _direction(octant, u / side, v / side)
-                kept = kept or _height(flat, i, x, y, z) >= _height(flat, best, x, y, z) - margin
+            for corner in range(corners):
+                x, y, z, low = least[corner]
+                kept = kept or _height(flat, i, x, y, z) >= low
             if kept:
                 if count < len(found):
                     found[count] = i

@@ -14,7 +14,7 @@ import numpy as np
 from numba import boolean, float64, int64
 
 from replay.collision.bodies import BODIES_TYPE, Bodies
-from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, LOWER, SEPARATED, STEPS, UNDECIDED, Workspace
+from replay.collision.gjk_exact import CONTACT, DISTANCE, EXACT, LEFT, LOWER, SEPARATED, STEPS, UNDECIDED, Workspace
 from replay.collision.gjk_kernel import ROUNDING, query
 from replay.geometry.containment import inside
 from replay.geometry.tree import MAX_DEPTH, Tree
@@ -64,11 +64,12 @@ def closest(
     limit: float,
     seed: Integers,
     work: Workspace,
+    precise: Floats | None,
     nodes: Integers,
     gaps: Floats,
     counts: Integers,
 ) -> tuple[int, float]:
-    """Return (CONTACT | UNDECIDED, 0), or (SEPARATED, distance [m] of the sets, inf if it is above `limit`).
+    """Return (CONTACT | UNDECIDED | LEFT, 0), or (SEPARATED, distance [m] of the sets, inf if it is above `limit`).
 
     Args:
         bodies: of the scene.
@@ -76,7 +77,7 @@ def closest(
         rotation, translation: (3, 3) and (3,) of T_a_b.
         limit: larger distances are of no interest [m]; 0 asks for contact only.
         seed: (7, 2): [0] the sets (global) that were nearest last time, -1 for none; [1:6] their simplex; in and out.
-        work: scratch of GJK.
+        work, precise: scratch of GJK; LEFT is returned where a query needs `precise` and it is None.
         nodes, gaps: (STACK, 2), (STACK,) scratch.
         counts: (COUNTS, ...) added to.
     """
@@ -129,7 +130,9 @@ def closest(
             if set_a == tried_a and set_b == tried_b:
                 continue
             work.simplex[4, 0] = 0
-        status = query(bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work)
+        status = query(bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work, precise)
+        if status == LEFT:
+            return LEFT, 0.0
         counts[QUERIES] += 1
         counts[ITERATIONS] += int(work.result[STEPS])
         counts[IN_DOUBLE_DOUBLE] += int(work.result[EXACT])

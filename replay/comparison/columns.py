@@ -171,10 +171,17 @@ def _summarise(
         first=frames.baseline_moment(int(np.argmax(decisive))),
         worst_abs=worst(errors.error),
         worst_rel=worst(errors.relative),
+        least=None if kind is Kind.ROTATION else _least(x, y),
         nan=int((errors.nan & outside).sum()),
         infinite=int((errors.infinite & outside).sum()),
         echo=echoes,
     )
+
+
+def _least(x: Column, y: Column) -> tuple[float, float] | None:
+    if np.isnan(x).all() or np.isnan(y).all():
+        return None
+    return float(np.nanmin(x)), float(np.nanmin(y))
 
 
 def _compare_states(

@@ -49,7 +49,7 @@ def compare(
             have that the baseline's format or model cannot have.
         equal: number of signals that are known to be equal and are in neither recording.
     """
-    rules = rules or Rules()
+    rules = (rules or Rules()).of(candidate.provenance.scenario)
     frames, matched = match_frames(baseline.time, candidate.time, rules)
     groups_a = {group.key: group for group in groups(baseline)}
     groups_b = {group.key: group for group in groups(candidate)}

@@ -89,6 +89,7 @@ class SignalDifference:
         outside: of these, frames outside the tolerance; for states, events that are not accepted.
         first: the first frame outside the tolerance, or that differs when none is outside.
         worst_abs, worst_rel: over all frames that differ by a finite number.
+        least: the smallest number of each run over all common frames; None where one has none, and for states.
         nan: frames in which NaN is not accepted: in one run only, or in any under `nan: fail`.
         infinite: frames with an infinity in one run only, or two of opposite sign.
         echo: further frames that differ only because another signal says that there is no value.
@@ -104,6 +105,7 @@ class SignalDifference:
     first: Moment
     worst_abs: Worst | None = None
     worst_rel: Worst | None = None
+    least: tuple[float, float] | None = None
     nan: int = 0
     infinite: int = 0
     echo: int = 0
@@ -213,8 +215,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Rule):
         expires = None if value.expires is None else value.expires.isoformat()
         tolerance = dataclasses.asdict(value.tolerance)
+        only = {"scenarios": list(value.scenarios)} if value.scenarios else {}
         link = {} if value.link is None else {"link": value.link}
-        return {"signals": list(value.signals), **tolerance, "reason": value.reason, **link, "expires": expires}
+        return {"signals": list(value.signals), **tolerance, "reason": value.reason, **link, "expires": expires, **only}
     if dataclasses.is_dataclass(value):
         return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, tuple | list):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from replay.comparison import quantities
+from replay.comparison.axes import Mark, columns, state_marks, time_ticks
 from replay.comparison.diff import match_frames
 from replay.comparison.difference import Difference, SignalDifference
+from replay.comparison.effects import effects
 from replay.comparison.numbers import compare_numbers, compare_rotations
 from replay.comparison.rules import EXACT, Rules
 from replay.comparison.runs import RecordingPair
@@ -34,6 +38,7 @@ class ComparedCurve:
         error: the difference; `limit` what its tolerance accepts.
         outside: frames outside the tolerance; for states, frames that differ.
         steps: the values are states, which hold until the next frame.
+        states: their names from 0 on, where they have any.
     """
 
     seconds: Floats
@@ -43,6 +48,7 @@ class ComparedCurve:
     limit: Floats
     outside: Flags
     steps: bool
+    states: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,8 @@ class Plot:
         error, limit: lines of the difference and of what the tolerance accepts.
         marks: x of frames outside the tolerance, one a pixel at most.
         low, high: of the values; `largest` of the differences; `begin`, `end` of the time [s].
+        ticks: times along the axis; `levels` names of states, `bounds` what is expected of the values, up the axis.
+        columns: what is told under the pointer: from where, how wide, and the values of both runs.
     """
 
     signal: str
@@ -70,6 +78,14 @@ class Plot:
     largest: float
     begin: float
     end: float
+    ticks: tuple[Mark, ...] = ()
+    levels: tuple[Mark, ...] = ()
+    bounds: tuple[Mark, ...] = ()
+    columns: tuple[tuple[float, float, str], ...] = ()
+
+    def shown(self, value: float) -> str:
+        """Return one of its values in a unit that suits it."""
+        return quantities.shown(value, self.unit, digits=4)
 
     @property
     def size(self) -> int:
@@ -96,7 +112,9 @@ class Curves:
         tolerance = EXACT if item.rule is None else item.rule.tolerance
         if group_a.field.kind.is_state:
             a, b = x.astype(np.float64), y.astype(np.float64)
-            return ComparedCurve(self.seconds, a, b, np.abs(a - b), np.zeros(len(a)), a != b, steps=True)
+            names = tuple(state.name.lower().replace("_", " ") for state in group_a.field.states or ())
+            names = names or (("no", "yes") if group_a.field.kind is Kind.FLAG else ())
+            return ComparedCurve(self.seconds, a, b, np.abs(a - b), np.zeros(len(a)), a != b, steps=True, states=names)
         if group_a.field.kind is Kind.ROTATION:
             errors = compare_rotations(x, y, tolerance)
             limit = np.full(len(x), tolerance.abs)
@@ -113,17 +131,29 @@ def _rows(column: Column, rows: Integers | None) -> Column:
     return column if rows is None else column[rows]
 
 
-def plots(found: Difference, pair: RecordingPair) -> tuple[Plot, ...]:
-    """Return the drawings of the first `SHOWN` signals that differ."""
+def plots(found: Difference, pair: RecordingPair, limits: Mapping[str, float] | None = None) -> tuple[Plot, ...]:
+    """Return the drawings of the first `SHOWN` signals that differ, those that the effects are about before others.
+
+    Args:
+        found: how the recordings of the pair differ.
+        pair: the recordings.
+        limits: smallest clearances [m] that are expected, by pair of shapes.
+    """
     curves = Curves(pair)
-    return tuple(_plot(item, curves.curve(item)) for item in found.signals[:SHOWN])
+    main = {effect.signals[0]: k for k, effect in enumerate(effects(found)) if effect.signals}
+    ordered = sorted(found.signals, key=lambda item: (not item.decides, main.get(item.signal.full_name, len(main))))
+    known = {f"{_CLEARANCE}{name}": limit for name, limit in (limits or {}).items()}
+    return tuple(_plot(item, curves.curve(item), known.get(item.signal.full_name)) for item in ordered[:SHOWN])
 
 
-def _plot(item: SignalDifference, curve: ComparedCurve) -> Plot:
+_CLEARANCE = "/collision/clearance/"
+
+
+def _plot(item: SignalDifference, curve: ComparedCurve, bound: float | None) -> Plot:
     begin, end = float(curve.seconds[0]), float(curve.seconds[-1])
     width = end - begin or 1.0
     x = (curve.seconds - begin) / width * WIDTH
-    low, high = _range(np.concatenate((curve.baseline, curve.candidate)))
+    low, high = _range(np.concatenate((curve.baseline, curve.candidate, [] if bound is None else [bound])))
     _, largest = _range(np.concatenate((curve.error, [0.0])))
 
     def upper(values: Floats) -> Floats:
@@ -150,6 +180,10 @@ def _plot(item: SignalDifference, curve: ComparedCurve) -> Plot:
             largest=largest,
             begin=begin,
             end=end,
+            ticks=time_ticks(begin, end, WIDTH),
+            levels=state_marks(curve.states, low, high, HEIGHT),
+            bounds=() if bound is None else ((float(upper(np.array([bound]))[0]), "limit"),),
+            columns=columns(curve.seconds, x, curve.baseline, curve.candidate, item.signal.unit, curve.states),
         )
 
 

@@ -8,10 +8,11 @@ from importlib import resources
 from typing import Any
 
 from replay.comparison import wording
-from replay.comparison.difference import DiffVerdict
+from replay.comparison.difference import Difference, DiffVerdict, SignalDifference
+from replay.comparison.effects import effects
 from replay.comparison.plots import HEIGHT, LOWER, SHOWN, WIDTH, Plot
 from replay.comparison.runs import Case, RunDifference
-from replay.errors import printable
+from replay.errors import count, printable
 
 
 def html(found: RunDifference, plots: Mapping[str, Sequence[Plot]]) -> str:
@@ -36,8 +37,23 @@ def details(case: Case, plots: Sequence[Plot]) -> Any:
     from markupsafe import Markup
 
     drawings = {plot.signal: plot for plot in plots}
-    text = _template("case.html.j2").render(case=case, drawings=drawings, wording=wording, draw=draw, shown=SHOWN)
+    text = _template("case.html.j2").render(
+        case=case,
+        drawings=drawings,
+        wording=wording,
+        draw=draw,
+        shown=SHOWN,
+        folded=folded(case.difference),
+        count=count,
+    )
     return Markup(text)  # rendered with autoescape
+
+
+def folded(found: Difference) -> list[tuple[SignalDifference, list[SignalDifference]]]:
+    """Return the signals that decide, the worst first: of each effect the one it is about, and what follows from it."""
+    known = {item.signal.full_name: item for item in found.deciding}
+    told = [[known[name] for name in effect.signals if name in known] for effect in effects(found)]
+    return [(items[0], items[1:]) for items in told if items]
 
 
 def draw(plot: Plot) -> Any:

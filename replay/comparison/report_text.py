@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from replay.comparison import wording
 from replay.comparison.difference import Change, Difference, DiffVerdict, SignalDifference
+from replay.comparison.effects import effects, headline
 from replay.comparison.runs import Case, RunDifference
 from replay.errors import count, printable
 
@@ -38,6 +39,8 @@ def _case(case: Case, verbose: bool, above: tuple[Change, ...]) -> Iterator[str]
     """Yield the lines of a scenario; `above` is the provenance that was written last."""
     found = case.difference
     yield f"{found.verdict.value}: {case.name}: {wording.summary(found)}"
+    if found.verdict is DiffVerdict.DIFFERENT:
+        yield from (f"  worst: {line}" for line in [headline(effects(found))] if line)
     repeats = found.provenance == above
     if found.provenance and (verbose or not repeats or found.verdict is DiffVerdict.DIFFERENT):
         decides = "decides" if found.strict_provenance else "does not decide"

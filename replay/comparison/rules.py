@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from replay.language.globs import any_of
+from replay.language.globs import any_of, fits
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ class Rule:
         link: where it is discussed.
         expires: last day on which the rule applies.
         place: where the rule is written.
+        scenarios: patterns of the scenarios that it is for; all when there are none.
     """
 
     signals: tuple[str, ...]
@@ -61,6 +62,7 @@ class Rule:
     link: str | None = None
     expires: datetime.date | None = None
     place: str = ""
+    scenarios: tuple[str, ...] = ()
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
@@ -69,6 +71,10 @@ class Rule:
     def matches(self, full_name: str) -> bool:
         """Return whether the rule is for the signal of this full name."""
         return self._pattern.match(full_name) is not None
+
+    def is_for(self, scenario: str) -> bool:
+        """Return whether the rule is for a scenario: it names all, or this one, or a pattern that it fits."""
+        return not self.scenarios or any(scenario == glob or fits(scenario, glob) for glob in self.scenarios)
 
 
 @dataclass(frozen=True)
@@ -89,6 +95,15 @@ class Rules:
         """Return the rules as they apply on a day."""
         late = tuple(rule for rule in rules if rule.expires is not None and rule.expires < day)
         return Rules(tuple(rule for rule in rules if rule not in late), late)
+
+    def of(self, scenario: str) -> Rules:
+        """Return the rules that are for a scenario."""
+        if not any(rule.scenarios for rule in (*self.active, *self.expired)):
+            return self
+        active, expired = (
+            tuple(rule for rule in rules if rule.is_for(scenario)) for rules in (self.active, self.expired)
+        )
+        return Rules(active, expired)
 
     def rule(self, full_name: str) -> Rule | None:
         """Return the rule that applies to a signal, or None: exact."""

@@ -64,6 +64,13 @@ def _patterns(value: object) -> tuple[str, ...]:
     return tuple(patterns)
 
 
+def _globs(value: object) -> tuple[str, ...]:
+    globs = [value] if isinstance(value, str) else value
+    if not isinstance(globs, list) or not globs or not all(isinstance(glob, str) and glob for glob in globs):
+        raise rejected("must be the name of a scenario or a pattern such as 'carm_*', or a list of them")
+    return tuple(globs)
+
+
 def _day(value: object) -> datetime.date:
     try:
         if isinstance(value, str) and re.fullmatch(r"\d{4}-\d{2}-\d{2}", value):
@@ -88,6 +95,8 @@ _TIME_SCHEMA = {"anyOf": _SECONDS_SCHEMA}
 _SHIFT_SCHEMA = {"anyOf": [*_SECONDS_SCHEMA, _FRAMES_SCHEMA]}
 _PATTERN_SCHEMA = {"type": "string", "pattern": r"^[/*]"}
 _PATTERNS_SCHEMA = {"anyOf": [_PATTERN_SCHEMA, {"type": "array", "items": _PATTERN_SCHEMA, "minItems": 1}]}
+_GLOB_SCHEMA = {"type": "string", "minLength": 1}
+_GLOBS_SCHEMA = {"anyOf": [_GLOB_SCHEMA, {"type": "array", "items": _GLOB_SCHEMA, "minItems": 1}]}
 _DAY_SCHEMA = {"type": "string", "pattern": r"^\d{4}-\d{2}-\d{2}$", "format": "date"}
 
 Bound = Annotated[float, PlainValidator(_bound), WithJsonSchema({"type": "number", "minimum": 0})]
@@ -98,6 +107,8 @@ class RuleText(Part):
 
     signal: Annotated[tuple[str, ...], PlainValidator(_patterns), WithJsonSchema(_PATTERNS_SCHEMA)]
     """Full names: topic/field/name, such as /collision/clearance/arc/bow|table/top; * matches anything, / included."""
+    scenario: Annotated[tuple[str, ...], PlainValidator(_globs), WithJsonSchema(_GLOBS_SCHEMA)] = ()
+    """Scenarios that the rule is for, by name or pattern; all when left out."""
     reason: Annotated[Text, AfterValidator(_not_blank)]
     """Why the difference is acceptable."""
     abs: Bound = 0.0
@@ -177,7 +188,7 @@ def _rule(text: RuleText, place: str) -> Rule:
         zero=text.zero,
         ignore=text.ignore,
     )
-    return Rule(text.signal, tolerance, text.reason, text.link, text.expires, place)
+    return Rule(text.signal, tolerance, text.reason, text.link, text.expires, place, text.scenario)
 
 
 def schema_text() -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NotRequired
 
 from typing_extensions import TypedDict
 
@@ -21,11 +24,18 @@ class RunScenario(TypedDict):
     status: str
 
 
+class RunVerdict(TypedDict):
+    """What run.json says of the comparison of one scenario, as far as it is read."""
+
+    cause: NotRequired[str]
+
+
 class WrittenRun(TypedDict):
     """run.json, as far as it is read."""
 
     scenarios: dict[str, RunScenario]
     interrupted: bool
+    verdicts: NotRequired[dict[str, RunVerdict]]
 
 
 def read_run(folder: Path) -> WrittenRun:
@@ -40,21 +50,33 @@ def recordings_in(folder: Path) -> dict[str, Path]:
     them; of a folder without a run.json, such as a baseline, all that there are.
 
     Raises:
-        RecordingError: there are none, or run.json is not one that replay wrote.
+        RecordingError: there are none, run.json is not one that replay wrote, or a folder may not be looked into.
     """
     report = folder / RUN
-    if report.exists():
+    listed = os.path.lexists(report)
+    if listed:
         found = {name: folder / name / f"{name}.mcap" for name in _listed(folder)}
     else:
         found = {}
-        for path in sorted(folder.rglob("*.mcap")):
+        for path in sorted(_below(folder)):
             inside = path.relative_to(folder).with_suffix("")
             name = inside.parent if inside.parent.name == inside.name else inside
             found[name.as_posix()] = path
     if not found:
-        what = "its run.json lists no recording" if report.exists() else "holds no recording (*.mcap)"
+        what = "its run.json lists no recording" if listed else "holds no recording (*.mcap)"
         raise RecordingError(str(folder), what)
     return found
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Yield the recordings in a folder and below; hidden folders hold what is not in place yet."""
+
+    def refuse(error: OSError) -> None:
+        raise RecordingError(str(error.filename), f"cannot be looked through: {error.strerror}")
+
+    for place, folders, files in os.walk(folder, onerror=refuse):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        yield from (Path(place) / file for file in files if file.endswith(".mcap"))
 
 
 def _listed(folder: Path) -> list[str]:

@@ -142,7 +142,8 @@ def rule(item: Rule | None) -> str:
         return "no rule: exact"
     link = f" ({item.link})" if item.link else ""
     until = f", until {item.expires.isoformat()}" if item.expires else ""
-    return f"rule {tolerance(item)}{until}: {item.reason.strip()}{link}"
+    only = f" of {', '.join(item.scenarios)}" if item.scenarios else ""
+    return f"rule {tolerance(item)}{only}{until}: {item.reason.strip()}{link}"
 
 
 def tolerance(item: Rule) -> str:

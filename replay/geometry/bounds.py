@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -17,6 +18,8 @@ from replay.geometry.smallest_ball import smallest_ball_centre
 from replay.numerics.arguments import as_floats
 from replay.numerics.arrays import Floats
 from replay.numerics.constants import EPSILON
+from replay.numerics.extents import extents
+from replay.numerics.kept import kept
 from replay.numerics.rows import distinct_rows
 
 __all__ = [
@@ -96,12 +99,13 @@ def fit_sphere(points: Floats) -> Sphere:
 def fit_aabb(points: Floats) -> Aabb:
     """Return the smallest axis-aligned box around points (n, 3) [m], n >= 1; errors as `fit_sphere`."""
     points = _checked("points", points)
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    lower, upper = extents(points)
     center = 0.5 * lower + 0.5 * upper
     half_widths = np.maximum(upper - center, center - lower)
     return Aabb(center, half_widths * (1.0 + _ULPS * EPSILON))
 
 
+@kept
 def principal_obb(
     points: Floats,
     *,
@@ -119,18 +123,16 @@ def principal_obb(
     points = _checked("points", points)
     surface = None if triangles is None else _corners(points, triangles)
     local, origin, scale = to_unit_box(points)
-    hull = None
-    if len(local) > 3:
-        local = distinct_rows(local).rows if method == "triangles" else local
-        hull = convex_hull(local)
-    covariance = np.zeros((3, 3))
-    area = 0.0
-    if method == "triangles" and (surface is not None or hull is not None):
+    if len(local) > 3 and method == "triangles":
+        local = distinct_rows(local).rows
+    hull = cache(lambda: convex_hull(local) if len(local) > 3 else None)  # most boxes need none
+    faces = None
+    if method == "triangles":
         if surface is not None:  # in its own unit box: the axes do not depend on the scale
             faces = to_unit_box(surface.reshape(-1, 3))[0].reshape(-1, 3, 3)
-        else:
-            faces = np.ascontiguousarray(local[hull.faces])  # type: ignore[union-attr]
-        area, covariance = covariance_of_triangles(faces)
+        elif (around := hull()) is not None:
+            faces = np.ascontiguousarray(local[around.faces])
+    area, covariance = (0.0, np.zeros((3, 3))) if faces is None else covariance_of_triangles(faces)
     if not area > 0.0:
         covariance = covariance_of_points(local)
     return _tight(points, local, origin, scale, box_axes(local, hull, covariance))

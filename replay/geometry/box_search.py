@@ -22,6 +22,7 @@ _GAIN = 1e-9  # a smaller box is smaller by more than this, relative
 _MOST_TURNS = 60
 _MOST_NUDGES = 200
 _FIRST_NUDGE, _LAST_NUDGE = 0.3, 1e-6  # [rad]
+_ROUNDING = 1e-13  # of heights over points of extent 1, and of angles
 _NUDGED = 3  # best boxes that are nudged
 
 
@@ -138,6 +139,7 @@ def _nudge(points: Floats, axes: Floats, volume: float, trial: Floats, best: Flo
         c, s = math.cos(angle), math.sin(angle)
         least = volume * (1.0 - _GAIN)
         found = False
+        outer = _outermost_within(points, axes, angle)
         for k in range(len(_NUDGES)):
             u = _NUDGES[k]
             x = u[0] * axes[0, 0] + u[1] * axes[1, 0] + u[2] * axes[2, 0]
@@ -149,7 +151,7 @@ def _nudge(points: Floats, axes: Floats, volume: float, trial: Floats, best: Flo
                 trial[i, 0] = c * ax + s * (y * az - z * ay) + w * x
                 trial[i, 1] = c * ay + s * (z * ax - x * az) + w * y
                 trial[i, 2] = c * az + s * (x * ay - y * ax) + w * z
-            turned = box_volume(points, trial)
+            turned = box_volume(outer, trial)
             if turned < least:
                 least, found = turned, True
                 _copy(trial, best)
@@ -162,3 +164,41 @@ def _nudge(points: Floats, axes: Floats, volume: float, trial: Floats, best: Flo
             if angle < _LAST_NUDGE:
                 break
     return volume
+
+
+@kernel
+def _outermost_within(points: Floats, axes: Floats, angle: float) -> Floats:
+    """Return the points (k, 3) that may be outermost along any of the axes turned by up to an angle < pi / 2.
+
+    Along an axis turned by phi, a point h below the outermost one and r away from it comes to lie at least
+    h cos(phi) - r sin(phi) below.
+    """
+    slope = math.tan(angle)
+    ends = np.zeros((3, 2), np.int64)
+    far = np.empty((3, 2))
+    for i in range(3):
+        x, y, z = axes[i, 0], axes[i, 1], axes[i, 2]
+        low, high = np.inf, -np.inf
+        for k in range(len(points)):
+            along = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
+            if along < low:
+                low, ends[i, 0] = along, k
+            if along > high:
+                high, ends[i, 1] = along, k
+        far[i, 0], far[i, 1] = low, high
+    result = np.empty((len(points), 3))
+    count = 0
+    for k in range(len(points)):
+        p = points[k]
+        kept = False
+        for i in range(3):
+            along = axes[i, 0] * p[0] + axes[i, 1] * p[1] + axes[i, 2] * p[2]
+            for end in range(2):
+                height = abs(far[i, end] - along) - _ROUNDING
+                q = points[ends[i, end]]
+                x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+                kept = kept or height <= 0.0 or height * height <= slope * slope * (x * x + y * y + z * z)
+        if kept:
+            result[count, 0], result[count, 1], result[count, 2] = p[0], p[1], p[2]
+            count += 1
+    return result[:count]

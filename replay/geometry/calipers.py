@@ -11,9 +11,11 @@ import math
 import numpy as np
 from numba import float64
 
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel
 
+_MANY = 1000  # points from which those inside are left out first
+_INSIDE = 1e-12  # of points of extent 1: those deeper inside are on no hull that rounding gives
 _NOISE = 1e-14  # of points of extent 1: edges shorter than this have no direction
 
 
@@ -58,6 +60,9 @@ def turn_about(points: Floats, axis: Floats, axes: Floats) -> float:
 @kernel
 def _hull_of_projection(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the hull of points in the plane, counter-clockwise (Andrew's monotone chain)."""
+    if len(x) > _MANY:
+        outer = _not_inside(x, y)
+        x, y = x[outer], y[outer]
     n = len(x)
     order = np.argsort(x, kind="mergesort")
     for k in range(1, n):  # equal x by y; few are equal, so this is short
@@ -81,6 +86,78 @@ def _hull_of_projection(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         size -= 1  # the last of one side is the first of the other
     size = max(size, 1)
     return x[chain[:size]], y[chain[:size]]
+
+
+@kernel
+def _not_inside(x: Floats, y: Floats) -> Integers:
+    """Return which points may be on the hull: those that are not between a roof and a floor of others."""
+    n, buckets = len(x), int(math.sqrt(len(x)))
+    low, width = x.min(), (x.max() - x.min()) / buckets
+    scale = 1.0 / max(width, _INSIDE)
+    every = np.arange(n)
+    if not width > _INSIDE:
+        return every
+    bucket = np.empty(n, np.int64)
+    highest, lowest = np.full(buckets, -1, np.int64), np.full(buckets, -1, np.int64)
+    for k in range(n):
+        b = min(int((x[k] - low) * scale), buckets - 1)
+        bucket[k] = b
+        if highest[b] < 0 or y[k] > y[highest[b]]:
+            highest[b] = k
+        if lowest[b] < 0 or y[k] < y[lowest[b]]:
+            lowest[b] = k
+    roof, floor = _roof(x, y, highest, low, width, 1.0), _roof(x, y, lowest, low, width, -1.0)
+    count = 0
+    for k in range(n):
+        b = bucket[k]
+        if not (y[k] < roof[b] - _INSIDE and -y[k] < floor[b] - _INSIDE):
+            every[count] = k
+            count += 1
+    return every[:count]
+
+
+@kernel
+def _roof(x: Floats, y: Floats, highest: Integers, low: float, width: float, sign: float) -> Floats:
+    """Return how high the hull reaches at least in each bucket, with y times sign; -inf where that is not known.
+
+    Buckets are taken a little wider than they are, for points that rounding has put into their neighbour.
+    """
+    chain = np.empty(len(highest), np.int64)
+    size = 0
+    for point in highest:
+        if point < 0:
+            continue
+        while size >= 2:
+            a, b = chain[size - 2], chain[size - 1]
+            if sign * ((x[b] - x[a]) * (y[point] - y[a]) - (y[b] - y[a]) * (x[point] - x[a])) < 0.0:
+                break
+            size -= 1
+        chain[size] = point
+        size += 1
+    result = np.full(len(highest), -np.inf)
+    at = 0
+    for b in range(len(highest)):
+        left, right = low + (b - 0.01) * width, low + (b + 1.01) * width
+        if left < x[chain[0]] or right > x[chain[size - 1]]:
+            continue
+        while x[chain[at + 1]] < left:
+            at += 1
+        after = at
+        while x[chain[after + 1]] < right:
+            after += 1
+        first, last = (
+            _height(x, y, chain[at], chain[at + 1], left),
+            _height(x, y, chain[after], chain[after + 1], right),
+        )
+        result[b] = min(sign * first, sign * last)
+    return result
+
+
+@kernel
+def _height(x: Floats, y: Floats, a: int, b: int, at: float) -> float:
+    """Return how high the line from point a to b is."""
+    part = min(max((at - x[a]) / (x[b] - x[a]), 0.0), 1.0)
+    return (1.0 - part) * y[a] + part * y[b]  # type: ignore[no-any-return]
 
 
 @kernel

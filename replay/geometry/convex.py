@@ -11,8 +11,9 @@ from replay.errors import InvalidValue
 from replay.geometry.closing import NO_CAPS
 from replay.geometry.hull import extreme_points
 from replay.geometry.solid import Solid
-from replay.geometry.tree import Tree, build_tree
+from replay.geometry.tree import Tree, boxes_of, build_tree
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.kept import kept
 from replay.numerics.rows import distinct_rows
 
 
@@ -31,6 +32,7 @@ class ConvexSets(NamedTuple):
     closing: Floats  # (c, 3, 3) [m]
 
 
+@kept
 def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "exact") -> ConvexSets:
     """Return the convex sets that stand for a solid in collisions.
 
@@ -50,7 +52,7 @@ def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "e
     if pieces == "hull":
         return from_pieces([solid.vertices])
     if solid.pieces:
-        return from_pieces(solid.pieces)
+        return from_pieces(solid.pieces, extreme=solid.strictly_convex)
     if pieces == "exact":
         return _from_triangles(solid)
     from replay.geometry.decomposition import decompose
@@ -58,9 +60,14 @@ def convex_sets(solid: Solid, *, pieces: Literal["exact", "convex", "hull"] = "e
     return from_pieces(decompose(solid).pieces)
 
 
-def from_pieces(pieces: Sequence[Floats]) -> ConvexSets:
-    """Return the sets of convex pieces given by vertices (k, 3) [m]; vertices inside a piece's hull are left out."""
-    vertices = [extreme_points(distinct_rows(np.asarray(piece, dtype=np.float64) + 0.0).rows) for piece in pieces]
+def from_pieces(pieces: Sequence[Floats], *, extreme: bool = False) -> ConvexSets:
+    """Return the sets of convex pieces given by vertices (k, 3) [m].
+
+    Vertices inside a piece's hull are left out; none is looked for if all are known to be extreme.
+    """
+    vertices = [distinct_rows(np.asarray(piece, dtype=np.float64) + 0.0).rows for piece in pieces]
+    if not extreme:
+        vertices = [extreme_points(piece) for piece in vertices]
     first = np.concatenate([[0], np.cumsum([len(k) for k in vertices])]).astype(np.int64)
     lower = np.array([k.min(axis=0) for k in vertices])
     upper = np.array([k.max(axis=0) for k in vertices])
@@ -78,7 +85,7 @@ def _from_triangles(solid: Solid) -> ConvexSets:
     return ConvexSets(
         vertices=triangles.reshape(-1, 3),
         first=np.arange(0, 3 * len(triangles) + 1, 3, dtype=np.int64),
-        tree=build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=1),
+        tree=build_tree(*boxes_of(triangles), leaf_size=1),
         surface=solid.has_inside,
         closing=solid.closing,
     )

@@ -6,21 +6,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from replay.geometry.winding import components, sides
+from replay.geometry.winding import Sides, components, sides
 from replay.numerics.arrays import Flags, Integers
 from replay.numerics.rows import distinct_rows
 
 _MOST_TOGETHER = 200  # walls that close something only together
 
 
-def copies(faces: Integers) -> Flags:
+def copies(faces: Integers, found: Sides | None = None) -> Flags:
     """Return which faces (n,) have the corners of an earlier one, in either sense, and are not needed.
+
+    Args:
+        faces: (n, 3).
+        found: `sides(faces)` if they are at hand: what has two different faces at each edge holds no copies.
 
     Needed are the faces that closed bodies share: where two bodies meet in a wall that each of them has, one wall less
     leaves three triangles at each edge around it, and the second one makes them four. Copies are taken wall by wall,
     the smallest first, then walls that meet together; a sheet's two sides, or a body that is there twice, close nothing
     that way.
     """
+    if found is not None and (found.number == 2).all():
+        first, second = found.face.reshape(-1, 2).T
+        if not (faces[first].sum(axis=1) == faces[second].sum(axis=1)).any():
+            return np.zeros(len(faces), dtype=np.bool_)
     kind = distinct_rows(np.sort(faces, axis=1)).kind
     order = np.argsort(kind, kind="stable")
     begin = np.flatnonzero(np.diff(kind[order], prepend=-1))

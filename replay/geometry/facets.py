@@ -7,12 +7,15 @@ that these are seen to repeat (see `copies`).
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from numba import float64, int64
 
 from replay.geometry.winding import Sides, components, sides
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.jit import entry, kernel
 
 ROUNDING: Final = 2.0**-22
 """How far from its plane a corner of a flat piece may be, in parts of the largest coordinate.
@@ -36,11 +39,15 @@ class Alike(NamedTuple):
     source: Integers
 
 
-def alike(points: Floats, faces: Integers) -> Alike:
-    """Return faces (n, 3), indices of points (p, 3) [m], with one cut for all facets that have the same boundary."""
+def alike(points: Floats, faces: Integers, found: Sides | None = None) -> Alike:
+    """Return faces (n, 3), indices of points (p, 3) [m], with one cut for all facets that have the same boundary.
+
+    Args:
+        found: `sides(faces)` if they are at hand.
+    """
     every = np.arange(len(faces))
     points = points / np.max(np.abs(points))
-    found = sides(faces)
+    found = sides(faces) if found is None else found
     joined = _joined(points, faces, found)
     if joined is None:
         return Alike(faces, every)
@@ -68,19 +75,35 @@ def _joined(points: Floats, faces: Integers, found: Sides) -> Integers | None:
 
     One that is has at each edge of its boundary either more than two faces, or two that lie on each other.
     """
-    edge = np.flatnonzero(found.number == 2)
-    at = found.first[edge]
-    pairs = np.stack([found.face[at], found.face[at + 1]], axis=1)
-    a, b = points[found.ends[edge, 0]], points[found.ends[edge, 1]]
-    c, d = (points[faces[face].sum(axis=1) - found.ends[edge].sum(axis=1)] for face in pairs.T)
-    normal, opposite = np.cross(b - a, c - a), np.cross(b - a, d - a)
-    size = np.sqrt(np.maximum(np.sum(normal * normal, axis=1), np.sum(opposite * opposite, axis=1)))
-    volume = np.abs(np.sum(normal * (d - a), axis=1))
-    flat = volume <= size * np.minimum(_THIN * np.sqrt(size), ROUNDING)
-    turn = np.sum(normal * opposite, axis=1)
-    if len(edge) == len(found.number) and not (flat & (turn > 0.0)).any():
+    flat = _flat_edges(points, faces, found.face, found.first, found.ends)
+    if (found.number == 2).all() and not (flat > 0).any():
         return None
-    return np.asarray(pairs[flat & (turn < 0.0)])
+    at = found.first[:-1][flat < 0]
+    return np.stack([found.face[at], found.face[at + 1]], axis=1)
+
+
+@entry(float64[:, ::1], int64[:, ::1], int64[::1], int64[::1], int64[:, ::1])
+@kernel
+def _flat_edges(points: Floats, faces: Integers, face: Integers, first: Integers, ends: Integers) -> Integers:
+    """Return at which edges (e,) two faces are in one plane: beside each other -1, on each other 1; else 0."""
+    result = np.zeros(len(ends), np.int64)
+    for edge in range(len(ends)):
+        if first[edge + 1] - first[edge] != 2:
+            continue
+        low, high = ends[edge]
+        a, b = points[low], points[high]
+        one, other = faces[face[first[edge]]], faces[face[first[edge] + 1]]
+        c, d = points[one[0] + one[1] + one[2] - low - high], points[other[0] + other[1] + other[2] - low - high]
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        cx, cy, cz, dx, dy, dz = c[0] - a[0], c[1] - a[1], c[2] - a[2], d[0] - a[0], d[1] - a[1], d[2] - a[2]
+        nx, ny, nz = y * cz - z * cy, z * cx - x * cz, x * cy - y * cx
+        ox, oy, oz = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
+        size = math.sqrt(max(nx * nx + ny * ny + nz * nz, ox * ox + oy * oy + oz * oz))
+        volume = abs(nx * dx + ny * dy + nz * dz)
+        if volume <= size * min(_THIN * math.sqrt(size), ROUNDING):
+            turn = nx * ox + ny * oy + nz * oz
+            result[edge] = 1 if turn > 0.0 else (-1 if turn < 0.0 else 0)
+    return result
 
 
 def _same_boundary(found: Sides, label: Integers) -> list[list[int]]:

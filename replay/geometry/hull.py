@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.extents import extents
 
 
 class Hull(NamedTuple):
@@ -53,7 +54,7 @@ def to_unit_box(points: Floats) -> tuple[Floats, Floats, float]:
     A power of two makes the scaling exact, and subtracting a centre that is among the points' magnitudes loses
     nothing beyond the points' own rounding.
     """
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    lower, upper = extents(points)
     centre = 0.5 * lower + 0.5 * upper
     extent = float(np.max(0.5 * upper - 0.5 * lower))
     scale = float(2.0 ** np.ceil(np.log2(extent))) if extent > 0.0 else 1.0
@@ -74,4 +75,6 @@ def _qhull(local: Floats) -> Any:
 
 
 def _vertices(hull: Any) -> Integers:
-    return np.sort(hull.vertices).astype(np.int64)
+    used = np.zeros(len(hull.points), dtype=np.bool_)
+    used[hull.simplices] = True
+    return np.flatnonzero(used)

@@ -11,20 +11,19 @@ from numba import float64
 
 from replay.errors import InvalidValue, MeshError, count
 from replay.geometry.closing import NO_CAPS, Openness, caps, openness
+from replay.geometry.convexity import convex_piece
 from replay.geometry.copies import copies
-from replay.geometry.facets import ROUNDING, alike
-from replay.geometry.hull import extreme_points, to_unit_box
+from replay.geometry.facets import alike
 from replay.geometry.mesh_file import read_faces
 from replay.geometry.outward import Turned, inside_out
 from replay.geometry.parts import find_parts
 from replay.geometry.solid import Solid
-from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree, build_tree
 from replay.geometry.weld import weld, weld_copies
-from replay.geometry.winding import Topology, corner_indices, topology
+from replay.geometry.winding import Topology, corner_indices, sides, topology
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.constants import EPSILON
 from replay.numerics.jit import entry, kernel
-from replay.numerics.rows import distinct_rows
+from replay.numerics.kept import kept
 
 _LARGEST = 1e60  # volumes and squared areas of anything smaller stay finite
 
@@ -46,27 +45,35 @@ def load_mesh(path: Path | str, *, scale: float | Sequence[float], data: bytes |
         MeshError: unreadable or of another format, empty, not finite, without any triangle that has an area.
         InvalidValue: a scale that is not finite and positive, or along an axis not finite or 0.
     """
-    scales = _along_axes(scale)
-    name = str(path)
-    vertices, faces = read_faces(path, data)
+    read = _load if data is None else kept(_load)  # a file may change meanwhile
+    return read(str(path), _along_axes(scale), data)
+
+
+def _load(name: str, scales: Floats, data: bytes | None) -> Solid:
+    """Return the body in a mesh file, its coordinates multiplied by scales (3,); see `load_mesh`."""
+    vertices, faces = read_faces(name, data)
     if len(faces) == 0:
         raise MeshError(name, "holds no triangles")
     wrong = faces[(faces < 0) | (faces >= len(vertices))]
     if len(wrong):
         raise MeshError(name, f"a triangle refers to vertex {wrong[0]}; there are 0 to {len(vertices) - 1}")
-    bad = np.count_nonzero(~np.isfinite(vertices[faces]).all(axis=(1, 2)))
-    if bad:
+    if not np.isfinite(vertices).all() and (bad := _not_finite(vertices[faces])):
         raise MeshError(name, f"{bad} of {len(faces)} triangles have a corner that is not finite")
-    with np.errstate(over="ignore", under="ignore"):
-        triangles = vertices[faces] * scales
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):  # vertices of no triangle may be anything
+        triangles = (vertices * scales)[faces]
     if np.prod(np.sign(scales)) < 0.0:
         triangles = triangles[:, [0, 2, 1]]
     if np.max(np.abs(triangles)) > _LARGEST:
+        scale = float(scales[0]) if (scales == scales[0]).all() else scales.tolist()
         raise MeshError(name, f"coordinates times scale = {scale} reach beyond {_LARGEST} m")
     try:
         return solid_from_triangles(triangles)
     except InvalidValue as error:
         raise MeshError(name, error.rule) from error
+
+
+def _not_finite(triangles: Floats) -> int:
+    return int(np.count_nonzero(~np.isfinite(triangles).all(axis=(1, 2))))
 
 
 def _along_axes(scale: float | Sequence[float]) -> Floats:
@@ -98,51 +105,61 @@ def solid_from_triangles(triangles: Floats) -> Solid:
         notes.append(f"{without_area} of {len(triangles)} triangles have no area and were dropped")
     # A flat triangle may be the stitch between a long edge and two short ones: it counts for topology.
     points, faces = corner_indices(triangles)
-    joints = topology(faces)
+    found = sides(faces)
+    joints = topology(found)
     if not joints.is_closed:
         taken_for = weld(points, faces, flat)
         welded = int(np.count_nonzero(taken_for != np.arange(len(points))))
         if welded:
             faces = taken_for[faces]
-            triangles, before, joints = points[faces], joints, topology(faces)
+            found, before = sides(faces), joints
+            joints = topology(found)
             notes.append(_on_welding(points, taken_for, f"which closed {_closed_edges(before, joints)}"))
     known, taken_for = faces, weld_copies(points, faces, flat)
     if (taken_for != np.arange(len(points))).any():
         faces = taken_for[faces]
         notes.append(_on_welding(points, taken_for, "so that triangles repeat"))
-    faces, source = alike(points, faces)
-    triangles, flat = points[faces], flat[source]
-    again = copies(faces)
+    faces, source = alike(points, faces, found if faces is known else None)
+    flat = flat[source]
+    again = copies(faces, found if faces is known else None)
     repeats = int(np.count_nonzero(again & ~flat))
     if again.any():
         if repeats:
             rule = "repeat another one, in either sense, and were dropped"
-            notes.append(f"{repeats} of {len(triangles)} triangles {rule}")
-        triangles, faces, flat = triangles[~again], faces[~again], flat[~again]
+            notes.append(f"{repeats} of {len(faces)} triangles {rule}")
+        faces, flat = faces[~again], flat[~again]
     if faces is not known:
-        joints = topology(faces)
-    parts = find_parts(points, faces)
+        found = sides(faces)
+        joints = topology(found)
+    parts = find_parts(points, faces, found)
     if parts.turned.any():
         faces = np.where(parts.turned[:, None], faces[:, [0, 2, 1]], faces)
         count = int(np.count_nonzero(parts.turned & ~flat))
-        joints = topology(faces)
+        joints = topology(sides(faces))
         notes.append(f"{count} triangles were wound against their neighbours and turned over")
-    triangles, kept = points[faces[~flat]], parts._replace(label=parts.label[~flat])
-    turned = inside_out(triangles, kept)
-    triangles = np.where(turned.faces[:, None, None], triangles[:, [0, 2, 1]], triangles)
+    faces = faces[~flat]
+    turned = inside_out(points[faces], parts._replace(label=parts.label[~flat]))
     if turned.inside_out:
+        faces = np.where(turned.faces[:, None], faces[:, [0, 2, 1]], faces)
         notes.append(_on_turning(turned))
-    triangles = np.ascontiguousarray(triangles)
+    triangles = np.ascontiguousarray(points[faces])
     watertight = joints.is_closed
     closing = NO_CAPS
     if not watertight:
         closing = caps(triangles)
-        found = openness(triangles, closing)
-        closing = closing if found.has_inside else NO_CAPS
-        notes.append(_on_openness(joints, found))
-    pieces = (_convex_corners(triangles),) if watertight and _is_convex(triangles) else ()
-    dropped = without_area + repeats
-    return Solid(triangles, pieces=pieces, watertight=watertight, closing=closing, dropped=dropped, notes=tuple(notes))
+        seen = openness(triangles, closing)
+        closing = closing if seen.has_inside else NO_CAPS
+        notes.append(_on_openness(joints, seen))
+    convex = convex_piece(points, faces, None if flat.any() else found) if watertight else None
+    return Solid(
+        triangles,
+        pieces=() if convex is None else (convex.corners,),
+        strictly_convex=convex is not None and convex.strictly,
+        watertight=watertight,
+        closing=closing,
+        dropped=without_area + repeats,
+        notes=tuple(notes),
+    )
 
 
 def _on_welding(points: Floats, taken_for: Integers, effect: str) -> str:
@@ -183,57 +200,18 @@ def _on_openness(joints: Topology, found: Openness) -> str:
     return f"{what}inside is where the winding number is above 1/2; its largest defect on the surface is {defect}"
 
 
+@entry(float64[:, :, ::1])
+@kernel
 def _have_area(triangles: Floats) -> Flags:
     """Return which triangles (n,) are higher than the rounding of their own corners over their longest edge."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    edges = np.stack([b - a, c - b, a - c])
-    longest = np.max(np.abs(edges), axis=(0, 2))
-    safe = np.where(longest > 0.0, longest, 1.0)[:, None]
-    cross = np.cross(edges[0] / safe, edges[2] / safe)
-    return np.asarray((longest > 0.0) & (np.max(np.abs(cross), axis=1) > 4.0 * EPSILON))
-
-
-def _convex_corners(triangles: Floats) -> Floats:
-    return extreme_points(distinct_rows(triangles.reshape(-1, 3)).rows)
-
-
-def _is_convex(triangles: Floats) -> bool:
-    """Return whether a closed surface bounds its own hull: no corner lies outside any face's plane, within rounding."""
-    local, _, scale = to_unit_box(triangles.reshape(-1, 3))
-    slack = ROUNDING * float(np.max(np.abs(triangles))) / scale
-    corners = _convex_corners(local.reshape(-1, 3, 3))
-    return bool(_all_below(local.reshape(-1, 3, 3), corners, build_tree(corners, corners), slack))
-
-
-@entry(float64[:, :, ::1], float64[:, ::1], TREE_TYPE, float64)
-@kernel
-def _all_below(triangles: Floats, points: Floats, tree: Tree, slack: float) -> bool:
-    """Return whether no point is further than slack outside the plane of any triangle (all of some area).
-
-    Of a box of points, no point is further out than the corner that is furthest along the normal.
-    """
-    waiting = np.empty(MAX_DEPTH, np.int64)
-    for t in range(len(triangles)):
-        ax, ay, az = triangles[t, 0, 0], triangles[t, 0, 1], triangles[t, 0, 2]
-        ux, uy, uz = triangles[t, 1, 0] - ax, triangles[t, 1, 1] - ay, triangles[t, 1, 2] - az
-        vx, vy, vz = triangles[t, 2, 0] - ax, triangles[t, 2, 1] - ay, triangles[t, 2, 2] - az
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        limit = slack * np.sqrt(nx * nx + ny * ny + nz * nz)
-        waiting[0] = 0
-        size = 1
-        while size > 0:
-            size -= 1
-            node = waiting[size]
-            low, high = tree.lower[node], tree.upper[node]
-            x, y, z = high[0] if nx > 0.0 else low[0], high[1] if ny > 0.0 else low[1], high[2] if nz > 0.0 else low[2]
-            if nx * (x - ax) + ny * (y - ay) + nz * (z - az) <= limit:
-                continue
-            if tree.second[node] >= 0:
-                waiting[size], waiting[size + 1] = tree.second[node], node + 1
-                size += 2
-                continue
-            for k in range(tree.begin[node], tree.end[node]):
-                p = points[tree.order[k]]
-                if nx * (p[0] - ax) + ny * (p[1] - ay) + nz * (p[2] - az) > limit:
-                    return False
-    return True
+    result = np.zeros(len(triangles), np.bool_)
+    for k in range(len(triangles)):
+        a, b, c = triangles[k]
+        ux, uy, uz, vx, vy, vz = b[0] - a[0], b[1] - a[1], b[2] - a[2], a[0] - c[0], a[1] - c[1], a[2] - c[2]
+        wx, wy, wz = c[0] - b[0], c[1] - b[1], c[2] - b[2]
+        longest = max(abs(ux), abs(uy), abs(uz), abs(vx), abs(vy), abs(vz), abs(wx), abs(wy), abs(wz))
+        if longest > 0.0:
+            ux, uy, uz, vx, vy, vz = ux / longest, uy / longest, uz / longest, vx / longest, vy / longest, vz / longest
+            height = max(abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx))
+            result[k] = height > 4.0 * EPSILON
+    return result

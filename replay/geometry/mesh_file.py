@@ -1,4 +1,4 @@
-"""Mesh files as vertices and faces: OBJ and PLY read here, STL and GLB by trimesh once they are known to be whole."""
+"""Mesh files as vertices and faces: binary STL, OBJ and PLY read here, others by trimesh once they are whole."""
 
 from __future__ import annotations
 
@@ -43,6 +43,9 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         raise MeshError(name, f"the file ending {Path(path).suffix!r} is not one of {', '.join(FORMATS)}")
     if data is None:
         try:
+            size = Path(path).stat().st_size
+            if size > limits.FILE:
+                raise MeshError(name, f"has {size} bytes; at most {limits.FILE} are read")
             data = Path(path).read_bytes()
         except OSError as error:
             raise MeshError(name, error.strerror or "cannot be read") from error
@@ -65,6 +68,8 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         announced = 0
         if ending == ".stl":
             announced = stl_check.check(data)
+            if stl_check.is_binary(data):
+                return stl_check.triangles(data)
         else:
             data = glb_file.bare(data)
     except ValueError as error:

@@ -9,6 +9,7 @@ Flat and straight sets have eigenvalues that are zero within rounding; they are 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TypeVar
 
@@ -41,12 +42,12 @@ _LOOKED_AT = 2000  # faces that give trial axes
 _SMALL_HULL = 250  # vertices from which the effort goes down in proportion
 
 
-def box_axes(points: Floats, hull: Hull | None, covariance: Floats) -> Floats:
+def box_axes(points: Floats, hull: Callable[[], Hull | None], covariance: Floats) -> Floats:
     """Return the unit axes (3, 3 rows) of the box around points (n, 3) of extent about 1.
 
     Args:
         points: (n, 3); only hull vertices matter.
-        hull: the convex hull of the points, None if they are flat.
+        hull: returns the convex hull of the points, None if they are flat; called where a box has to be looked for.
         covariance: (3, 3) whose eigenvectors the axes are, where they are determined.
     """
     values, axes = eigen(covariance)
@@ -55,18 +56,22 @@ def box_axes(points: Floats, hull: Hull | None, covariance: Floats) -> Floats:
         return np.eye(3)
     lower_pair = middle - low <= NEARLY_REPEATED * middle
     upper_pair = high - middle <= NEARLY_REPEATED * high
-    corners = points if hull is None else np.ascontiguousarray(points[hull.vertices])
     if middle <= _FLAT * high or (lower_pair and not upper_pair):
-        return _about(corners, axes[2])
+        return _about(_corners(points, hull()), axes[2])
     if low <= _FLAT * high or (upper_pair and not lower_pair):
-        return _about(corners, axes[0])
-    if lower_pair and hull is not None:
+        return _about(_corners(points, hull()), axes[0])
+    if lower_pair and (around := hull()) is not None:
+        corners = _corners(points, around)
         trials, kept, turned = (_effort(bounds, len(corners)) for bounds in (_TRIALS, _KEPT, _TURNED))
-        floor = signed_volume(points[hull.faces])
+        floor = signed_volume(points[around.faces])
         return np.asarray(
-            smallest_box(corners, axes, _trial_axes(points, hull, trials), _spread_rotations(turned), kept, floor)
+            smallest_box(corners, axes, _trial_axes(points, around, trials), _spread_rotations(turned), kept, floor)
         )
     return axes
+
+
+def _corners(points: Floats, hull: Hull | None) -> Floats:
+    return points if hull is None else np.ascontiguousarray(points[hull.vertices])
 
 
 def _effort(bounds: tuple[int, int], vertices: int) -> int:

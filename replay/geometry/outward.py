@@ -12,6 +12,7 @@ from replay.geometry.parts import Parts
 from replay.geometry.solid import signed_volume
 from replay.geometry.tree import Tree, triangle_tree
 from replay.numerics.arrays import Flags, Floats, Integers
+from replay.numerics.extents import extents
 
 _ROUNDING = 1e-14  # of volumes, in cubes of the largest extent
 _MOST_OPEN_PARTS = 200  # more are crumbs of one surface, and looked at together
@@ -35,7 +36,8 @@ class Shell(NamedTuple):
     @property
     def is_inside_out(self) -> bool:
         """Whether its volume is negative, beyond rounding: two walls that coincide have none."""
-        extent = float(np.max(np.ptp(self.triangles.reshape(-1, 3), axis=0)))
+        lower, upper = extents(self.triangles.reshape(-1, 3))
+        extent = float(np.max(upper - lower))
         return self.volume < -_ROUNDING * extent**3
 
 
@@ -72,7 +74,8 @@ def _shells(triangles: Floats, parts: Parts) -> list[Shell]:
     apart = np.count_nonzero(~parts.closed) <= _MOST_OPEN_PARTS
     for which in groups:
         if parts.closed[parts.label[which[0]]]:
-            found.append(Shell(which, triangles[which], none, signed_volume(triangles[which])))
+            own = triangles if len(groups) == 1 else triangles[which]
+            found.append(Shell(which, own, none, signed_volume(own)))
         elif parts.one_sided[parts.label[which[0]]]:
             continue
         elif not apart or not _add_open(found, triangles, which):
@@ -94,8 +97,7 @@ def _add_open(found: list[Shell], triangles: Floats, which: Integers) -> bool:
 
 def _outermost(shells: list[Shell]) -> list[int]:
     """Return for each shell, largest first, which one that is in no other it is nested in, itself where it is none."""
-    lower = np.array([shell.triangles.min(axis=(0, 1)) for shell in shells])
-    upper = np.array([shell.triangles.max(axis=(0, 1)) for shell in shells])
+    lower, upper = np.array([extents(shell.triangles.reshape(-1, 3)) for shell in shells]).transpose(1, 0, 2)
     trees: dict[int, Tree] = {}
     root: list[int] = []
     for k, shell in enumerate(shells):

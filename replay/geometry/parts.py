@@ -39,9 +39,13 @@ class Parts(NamedTuple):
     one_sided: Flags
 
 
-def find_parts(points: Floats, faces: Integers) -> Parts:
-    """Return the parts of faces (n, 3), indices of points (p, 3). One-sided parts are left as they are wound."""
-    found = sides(faces)
+def find_parts(points: Floats, faces: Integers, found: Sides | None = None) -> Parts:
+    """Return the parts of faces (n, 3), indices of points (p, 3). One-sided parts are left as they are wound.
+
+    Args:
+        found: `sides(faces)` if they are at hand.
+    """
+    found = sides(faces) if found is None else found
     at = found.first[:-1][found.number == 2]
     pairs = np.stack([found.face[at], found.face[at + 1], found.forward[at] == found.forward[at + 1]], axis=1)
     several = np.flatnonzero(found.number > 2)
@@ -52,8 +56,10 @@ def find_parts(points: Floats, faces: Integers) -> Parts:
     label = components(len(faces), pairs)
     turned, one_sided = _against(label, pairs)
     if turned.any():  # where several meet, neighbours are a guess: what is closed as it is wound stays
-        turned &= ~_closed(faces, label, np.zeros_like(turned))[label]
-    return Parts(label, turned, _closed(faces, label, turned), one_sided)
+        turned &= ~_closed(found, label)[label]
+    if turned.any():
+        found = sides(np.where(turned[:, None], faces[:, [0, 2, 1]], faces))
+    return Parts(label, turned, _closed(found, label), one_sided)
 
 
 class _Joined:
@@ -148,9 +154,8 @@ def _angles(points: Floats, faces: Integers, found: Sides, edge: int, which: lis
     return angles
 
 
-def _closed(faces: Integers, label: Integers, turned: Flags) -> Flags:
+def _closed(found: Sides, label: Integers) -> Flags:
     """Return which parts are closed: walked equally often both ways along each edge, within the part."""
-    found = sides(np.where(turned[:, None], faces[:, [0, 2, 1]], faces))
     of_part = label[found.face]
     key = found.edge * (int(label.max()) + 1) + of_part
     steps = np.where(found.forward, 1, -1)

@@ -16,6 +16,7 @@ from replay.errors import InvalidValue
 from replay.geometry.solid import Solid
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.constants import FULL_TURN
+from replay.numerics.kept import kept
 from replay.numerics.rows import distinct_rows
 
 FEWEST_SEGMENTS = 8
@@ -50,6 +51,7 @@ def plane(size: Sequence[float]) -> Solid:
     return Solid(_quads(corners[None]), pieces=(corners,), watertight=False)
 
 
+@kept
 def sphere(radius: float, chord_error: float) -> Solid:
     """Return a sphere [m] about the origin as an icosahedron whose faces are split and pushed out to the sphere.
 
@@ -68,6 +70,7 @@ def sphere(radius: float, chord_error: float) -> Solid:
     return Solid(triangles, pieces=(_distinct(triangles),), chord_error=error)
 
 
+@kept
 def cylinder(radius: float, height: float, chord_error: float) -> Solid:
     """Return a cylinder [m] along z, centred on the origin."""
     _positive("height", height)
@@ -82,6 +85,7 @@ def cylinder(radius: float, height: float, chord_error: float) -> Solid:
     return Solid(np.concatenate([sides, *caps]), pieces=(np.concatenate([bottom, top]),), chord_error=error)
 
 
+@kept
 def cone(radius: float, height: float, chord_error: float) -> Solid:
     """Return a cone [m] along z, base at z = -height / 2, apex at z = +height / 2."""
     _positive("height", height)
@@ -94,6 +98,7 @@ def cone(radius: float, height: float, chord_error: float) -> Solid:
     return Solid(triangles, pieces=(np.concatenate([base, apex[:1]]),), chord_error=error)
 
 
+@kept
 def capsule(radius: float, height: float, chord_error: float) -> Solid:
     """Return a cylinder [m] along z between two half spheres, centred on the origin; height is the cylinder's part.
 
@@ -117,6 +122,7 @@ def capsule(radius: float, height: float, chord_error: float) -> Solid:
     return Solid(triangles, pieces=(_distinct(triangles),), chord_error=radius * _deepest(cap))
 
 
+@kept
 def ellipsoid(radii: Sequence[float], chord_error: float) -> Solid:
     """Return an ellipsoid of half axes radii (3,) [m] about the origin: a sphere's triangles, stretched.
 
@@ -135,6 +141,7 @@ def ellipsoid(radii: Sequence[float], chord_error: float) -> Solid:
     return Solid(triangles, pieces=(_distinct(triangles),), chord_error=error)
 
 
+@kept
 def arc(radius: float, span: float, width: float, thickness: float, chord_error: float) -> Solid:
     """Return a curved bar in the xy plane, symmetric about +x: a C-arm's arc, or with span 2 pi a ring.
 

@@ -73,6 +73,15 @@ def covariance_of_triangles(triangles: Floats) -> tuple[float, Floats]:
 @entry(float64[:, ::1])
 @kernel
 def eigen(matrix: Floats) -> tuple[Floats, Floats]:
+    """Return what `diagonalised` returns: for Python, where kernels call that.
+
+    An entry that returns arrays finds no memory for them once another entry that it is part of was loaded before it.
+    """
+    return diagonalised(matrix)
+
+
+@kernel
+def diagonalised(matrix: Floats) -> tuple[Floats, Floats]:
     """Return (values (3,) ascending, vectors (3, 3) in rows) of a symmetric matrix, by Jacobi's rotations.
 
     The vectors are a product of rotations, so they are orthonormal whether or not values repeat.

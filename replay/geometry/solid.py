@@ -19,6 +19,8 @@ class Solid:
         triangles: (n, 3, 3) corners [m], counter-clockwise seen from outside.
         pieces: vertex sets (k, 3) [m] whose convex hulls' union is the solid: one for a convex shape; () for a concave
             one that is to be collided by its triangles.
+        strictly_convex: whether it is one piece each of whose corners is a vertex of its hull, by far more than
+            rounding (see `geometry.convexity`): known of some, and False where nobody looked.
         watertight: whether the triangles close a volume.
         closing: (m, 3, 3) caps [m] of triangles that do not but have an inside all the same, see `geometry.closing`.
         chord_error: largest distance [m] of the triangles from the curved surface they stand for; 0 for flat faces.
@@ -28,6 +30,7 @@ class Solid:
 
     triangles: Floats
     pieces: tuple[Floats, ...] = ()
+    strictly_convex: bool = False
     watertight: bool = True
     closing: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
     chord_error: float = 0.0

@@ -1,12 +1,17 @@
-"""Whether an STL file is whole, told before its triangles are read."""
+"""Whether an STL file is whole, told before its triangles are read; and those of a binary one."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 
-from replay import limits
+import numpy as np
 
+from replay import limits
+from replay.numerics.arrays import Floats, Integers
+
+_HEADER = 84  # bytes
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _KEYWORDS = re.compile(rb"^[ \t]*(solid|endsolid|facet|endfacet|vertex)\b", re.MULTILINE | re.IGNORECASE)
 
 
@@ -16,16 +21,32 @@ def check(data: bytes) -> int:
     Raises:
         ValueError: a binary file is not as long as its header says; the parts of a text file do not fit together.
     """
-    triangles = int.from_bytes(data[80:84], "little")
-    needed = 84 + 50 * triangles
-    if len(data) == needed:
+    triangles = _announced(data)
+    needed = _HEADER + _FACET.itemsize * triangles
+    if is_binary(data):
         _check_count(triangles)
-        return triangles  # the header of a binary file may begin with "solid" too
+        return triangles
     if data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
         return _check_text(data)
-    if len(data) < 84:
+    if len(data) < _HEADER:
         raise ValueError(f"its header is cut; the file has {len(data)} bytes")
     raise ValueError(f"its header announces {triangles} triangles, which need {needed} bytes; the file has {len(data)}")
+
+
+def is_binary(data: bytes) -> bool:
+    """Return whether a file is as long as a binary one with its header, which may begin with "solid" too."""
+    return len(data) == _HEADER + _FACET.itemsize * _announced(data)
+
+
+def triangles(data: bytes) -> tuple[Floats, Integers]:
+    """Return the vertices (3 n, 3) and triangles (n, 3) of a binary file, corner by corner."""
+    corners = np.frombuffer(data, dtype=_FACET, offset=_HEADER)["corners"]
+    with np.errstate(invalid="ignore"):  # NaN that signals
+        return corners.reshape(-1, 3).astype(np.float64), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+def _announced(data: bytes) -> int:
+    return int.from_bytes(data[80:_HEADER], "little")
 
 
 def _check_count(triangles: int) -> None:

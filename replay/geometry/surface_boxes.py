@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numba import float64, int64
 
-from replay.geometry.principal_axes import eigen
+from replay.geometry.principal_axes import diagonalised
 from replay.geometry.tree import TREE_TYPE, Tree
 from replay.numerics.arrays import Floats, Integers, Singles
 from replay.numerics.jit import entry, kernel
@@ -96,7 +96,7 @@ def _axes(moments: Floats, matrix: Floats, axes: Floats) -> None:
     matrix[0, 0], matrix[0, 1], matrix[0, 2] = moments[4], moments[5], moments[6]
     matrix[1, 0], matrix[1, 1], matrix[1, 2] = moments[5], moments[7], moments[8]
     matrix[2, 0], matrix[2, 1], matrix[2, 2] = moments[6], moments[8], moments[9]
-    vectors = eigen(matrix)[1]
+    vectors = diagonalised(matrix)[1]
     for i in range(3):
         for j in range(3):
             axes[i, j] = np.float32(vectors[i, j])

@@ -17,6 +17,7 @@ from numba import float64, int64
 from replay.errors import InvalidValue
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, record
+from replay.numerics.kept import kept
 
 _BINS = 16
 _FREE_LEVELS = 32
@@ -80,12 +81,19 @@ def build_tree(lower: Floats, upper: Floats, *, leaf_size: int = 4) -> Tree:
     )
 
 
+@kept
 def triangle_tree(triangles: Floats, *, leaf_size: int = 4) -> Tree:
     """Return the tree over triangles (n, 3, 3) [m]; see `build_tree`."""
     triangles = np.asarray(triangles, dtype=np.float64)
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
         raise InvalidValue("triangles", triangles.shape, "must have shape (n, 3, 3)")
-    return build_tree(triangles.min(axis=1), triangles.max(axis=1), leaf_size=leaf_size)
+    return build_tree(*boxes_of(triangles), leaf_size=leaf_size)
+
+
+def boxes_of(triangles: Floats) -> tuple[Floats, Floats]:
+    """Return the least and the largest coordinates (n, 3) of each triangle (n, 3, 3)."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 @kernel

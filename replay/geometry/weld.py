@@ -10,6 +10,7 @@ from replay.geometry.copies import copies
 from replay.geometry.facets import alike
 from replay.geometry.winding import components, sides
 from replay.numerics.arrays import Flags, Floats, Integers
+from replay.numerics.extents import extents
 
 TOLERANCES: Final = (1e-12, 1e-9, 1e-6)
 """How far apart corners that are taken for one may be, as shares of the body's largest extent, tried in this order.
@@ -36,7 +37,7 @@ def weld(points: Floats, faces: Integers, flat: Flags) -> Integers:
     from scipy.spatial import cKDTree
 
     taken_for = np.arange(len(points))
-    extent = float(np.max(np.ptp(points, axis=0)))
+    extent = _extent(points)
     for tolerance in TOLERANCES:
         found = sides(taken_for[faces])
         ends = np.unique(found.ends[found.number % 2 == 1])
@@ -92,15 +93,22 @@ def weld_copies(points: Floats, faces: Integers, flat: Flags) -> Integers:
     """
     from scipy.spatial import cKDTree
 
-    itself, used = np.arange(len(points)), np.unique(faces)
-    reach = _ROUNDING * float(np.max(np.ptp(points, axis=0)))
-    pairs = used[cKDTree(points[used]).query_pairs(reach, output_type="ndarray")]
+    itself, named = np.arange(len(points)), np.zeros(len(points), dtype=np.bool_)
+    named[faces] = True
+    used, reach = np.flatnonzero(named), _ROUNDING * _extent(points)
+    tree = cKDTree(points[used], balanced_tree=False, compact_nodes=False)
+    pairs = used[tree.query_pairs(reach, output_type="ndarray")]
     if len(pairs) == 0:
         return itself
     group = components(len(points), pairs)
     allowed = _small(points, group, reach, faces[~flat])
     trial = _merged(group, allowed, np.bincount(faces.ravel(), minlength=len(points)))
     return trial if _copies(points, trial[faces]) > _copies(points, faces) else itself
+
+
+def _extent(points: Floats) -> float:
+    lower, upper = extents(points)
+    return float(np.max(upper - lower))
 
 
 def _copies(points: Floats, faces: Integers) -> int:

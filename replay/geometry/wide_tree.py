@@ -17,6 +17,7 @@ from replay.geometry.surface_boxes import BOX, HALVES, fit_boxes
 from replay.geometry.tree import MAX_DEPTH, TREE_TYPE, Tree
 from replay.numerics.arrays import Floats, Integers, ShortIntegers, Singles
 from replay.numerics.jit import entry, kernel, record
+from replay.numerics.kept import kept
 
 LANES = 8
 """Children of a node, and most triangles of a leaf."""
@@ -46,6 +47,7 @@ WIDE_TREE_TYPE = record(
 )
 
 
+@kept
 def widen(tree: Tree, triangles: Floats) -> WideTree:
     """Return the wide tree over triangles; equal input gives the equal tree.
 

@@ -77,17 +77,27 @@ def sides(faces: Integers) -> Sides:
     keep = start != end
     face, start, end = face[keep], start[keep], end[keep]
     low, high = np.minimum(start, end), np.maximum(start, end)
-    key = low * (int(faces.max(initial=0)) + 1) + high
-    order = np.argsort(key, kind="stable")
-    key = key[order]
+    key, order = _sorted(low * (int(faces.max(initial=0)) + 1) + high)
     first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
     ends = np.stack([low[order][first], high[order][first]], axis=1)
     return Sides(face[order], (start < end)[order], np.append(first, len(key)), ends)
 
 
-def topology(faces: Integers) -> Topology:
-    """Return the topology of a surface of faces (n, 3), corner indices."""
-    found = sides(faces)
+def _sorted(keys: Integers) -> tuple[Integers, Integers]:
+    """Return whole numbers >= 0 in order, and their places; equal ones as they came.
+
+    A key and its place in one number are sorted at once, as far as 63 bits hold them.
+    """
+    bits = len(keys).bit_length()
+    if int(keys.max(initial=0)) >> (63 - bits):
+        order = np.argsort(keys, kind="stable")
+        return keys[order], order
+    both = np.sort(keys << bits | np.arange(len(keys)))
+    return both >> bits, both & ((1 << bits) - 1)
+
+
+def topology(found: Sides) -> Topology:
+    """Return the topology of a surface whose faces have these sides."""
     count = found.number
     odd = count % 2 == 1
     turned = ~odd & (found.balance != 0)

@@ -43,9 +43,9 @@ class PartFile:
         self.path = path
         self._overwrite = overwrite
         self._finished = False
-        if path.exists() and not overwrite:
-            raise RecordingExistsError(str(path))
         try:
+            if path.exists() and not overwrite:
+                raise RecordingExistsError(str(path))
             path.parent.mkdir(parents=True, exist_ok=True)
             self.part, self._stream, self._ours = _open_part(path)
         except (OSError, UnicodeEncodeError) as error:
@@ -87,9 +87,9 @@ class PartFile:
             WriteError: as of `finish`, or what stands under the unfinished name is not this file any more.
         """
         self.finish()
-        if not self._overwrite and self.path.exists():
-            raise RecordingExistsError(str(self.path))
         try:
+            if not self._overwrite and self.path.exists():
+                raise RecordingExistsError(str(self.path))
             if self._ours and not is_at(self._stream.fileno(), self.part):
                 raise WriteError(str(self.path), f"{self.part.name} was removed or replaced while it was written")
             if os.name == "nt":  # which renames no open file
@@ -173,12 +173,12 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: 
         WriteError: it cannot be written.
     """
     data = data.encode() if isinstance(data, str) else data
-    if overwrite and named and (path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())):
-        try:
+    try:
+        if overwrite and named and (path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())):
             path.write_bytes(data)
-        except OSError as error:
-            raise write_error(path, error) from None
-        return path
+            return path
+    except OSError as error:
+        raise write_error(path, error) from None
     file = PartFile(path, overwrite=overwrite)
     try:
         file.write(data)
@@ -192,14 +192,17 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: 
 def append_lines(path: Path, lines: Iterable[str], *, named: bool = False) -> None:
     """Append lines to a text file and make the folders that it needs; all of them or, with a WriteError, none.
 
-    A file that has other names (hard links) loses them first. A link is refused, unless the user `named` it.
+    A file that has other names (hard links) loses them first. A link, a pipe or a device is refused, unless the user
+    `named` it.
     """
     if not named:
         refuse_link(path)
-    if not named and path.is_file() and path.stat().st_nlink > 1:
-        write_file(path, path.read_bytes())
     data = memoryview("".join(f"{line}\n" for line in lines).encode())
     try:
+        if not named and path.is_file() and path.stat().st_nlink > 1:
+            write_file(path, path.read_bytes())
+        elif not named and path.exists() and not path.is_file() and not path.is_dir():
+            raise WriteError(str(path), "it is a pipe or a device, and results are kept in files; remove it")
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("ab", buffering=0) as stream:
             lock(stream.fileno(), wait=True)  # several machines may append to one history
@@ -220,9 +223,13 @@ def refuse_link(path: Path) -> None:
     The folder itself may be reached through links: the user has named it.
 
     Raises:
-        WriteError: it is one.
+        WriteError: it is one, or may not be looked at.
     """
-    if path.is_symlink():
+    try:
+        linked = path.is_symlink()
+    except OSError as error:
+        raise write_error(path, error) from None
+    if linked:
         raise WriteError(str(path), "it is a link, and nothing is written through links here; remove it")
 
 
@@ -236,9 +243,10 @@ def write_error(path: Path, error: OSError | UnicodeEncodeError) -> WriteError:
     """Return the WriteError that says why the system refused `path`: a NoSpaceError when the disk is full."""
     if isinstance(error, UnicodeEncodeError):
         return WriteError(str(path), f"names of files are {error.encoding} here; LC_ALL=C.UTF-8 allows any")
-    in_the_way = next((folder for folder in path.parents if folder.exists() and not folder.is_dir()), None)
-    if in_the_way is not None:
-        return WriteError(str(path), f"{in_the_way} is a file where a folder is needed")
+    with contextlib.suppress(OSError):
+        in_the_way = next((folder for folder in path.parents if folder.exists() and not folder.is_dir()), None)
+        if in_the_way is not None:
+            return WriteError(str(path), f"{in_the_way} is a file where a folder is needed")
     kind = NoSpaceError if error.errno in _NO_SPACE else WriteError
     return kind(str(path), error.strerror or str(error))
 

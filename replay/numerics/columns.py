@@ -47,6 +47,7 @@ class Field:
             Foxglove's log level of its beginning; none where a recording tells nothing of it.
         begins: names of the states from 1 on for differences, where they are others than those of `events`.
         label: what tables call it; its name in words when left out.
+        spoken: what sentences call it; its name in words when left out.
         states: the enumeration that names its values.
         letters: of the components of a vector, a last axis of the column.
         each: the names of the layout that it has a value for each of, a last axis of the column; "" for one value. A
@@ -70,6 +71,7 @@ class Field:
     events: Mapping[str, int] = dataclasses.field(default_factory=dict)
     begins: tuple[str, ...] = ()
     label: str = ""
+    spoken: str = ""
     states: type[enum.IntEnum] | None = None
     letters: str = ""
     each: str = ""
@@ -127,6 +129,7 @@ def _described(name: str, array: Any, field: Field) -> Field:
         name=name,
         kind=Kind.LEVEL if field.states and not unordered else kinds.get(dtype.kind, Kind.CATEGORY),
         label=field.label or name.replace("_", " "),
+        spoken=field.spoken or name.replace("_", " "),
         begins=field.begins or tuple(field.events),
         most=most,
         type=dtype,

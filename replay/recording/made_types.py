@@ -31,6 +31,17 @@ def message_file(name: str, fields: Sequence[Field]) -> FileDescriptorProto:
     return file
 
 
+def names_file(name: str, fields: Sequence[str]) -> FileDescriptorProto:
+    """Return the file that declares a message type of lists of names, numbered from 1 on."""
+    package, _, title = name.rpartition(".")
+    file = FileDescriptorProto(name=f"{title}.proto", package=package, syntax="proto3")
+    message = file.message_type.add(name=title)
+    for number, field in enumerate(fields, start=1):
+        entry = message.field.add(name=field, number=number, json_name=field)
+        entry.label, entry.type = FieldDescriptorProto.LABEL_REPEATED, FieldDescriptorProto.TYPE_STRING
+    return file
+
+
 def _add(message: DescriptorProto, name: str, field: Field) -> None:
     words = field.name.split("_")
     entry = message.field.add(

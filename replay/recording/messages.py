@@ -17,7 +17,7 @@ from replay.guarding.columns import GuardColumns
 from replay.logs.mcap_records import Schema
 from replay.logs.protobuf import descriptor_set
 from replay.numerics.columns import Columns
-from replay.recording.made_types import message_file
+from replay.recording.made_types import message_file, names_file
 from replay.sensing.kinds import KINDS
 
 COLLISION = "replay.CollisionStates"
@@ -26,6 +26,9 @@ JOINTS = "foxglove.JointStates"
 TRANSFORMS = "foxglove.FrameTransforms"
 SCENE = "foxglove.SceneUpdate"
 LOG = "foxglove.Log"
+LAYOUT = "replay.Layout"
+LAYOUT_NAMES = ("links", "joints", "pairs", "shapes", "objects", "sensors")
+"""Fields of Layout, lists of names, in the order of their numbers from 1 on."""
 EARLIEST = 1000
 """Number of the field `earliest` of Log."""
 
@@ -51,6 +54,7 @@ def _own_types() -> Any:
     pool = descriptor_pool.DescriptorPool()
     for name, columns in types.items():
         pool.AddSerializedFile(message_file(name, columns.fields()).SerializeToString())
+    pool.AddSerializedFile(names_file(LAYOUT, LAYOUT_NAMES).SerializeToString())
     return pool
 
 

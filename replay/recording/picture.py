@@ -15,6 +15,8 @@ from typing import IO, Any
 from replay.errors import ViewerError
 from replay.logs.part_file import write_file
 from replay.recording.blueprint import TIMELINE
+from replay.recording.own_folder import own_folder
+from replay.recording.rearranged import Camera, write_rearranged
 from replay.recording.viewer_process import LOOPBACK, free_port, quarters, running, viewer_binary
 
 _STARTUP = 60.0  # [s] until the viewer must answer
@@ -25,7 +27,13 @@ _TYPED = 10_000_000  # [ns] by which a moment may be after the end: the end type
 
 
 def picture(
-    recording: str | Path, png: str | Path, *, at: float | None = None, size: tuple[int, int] = (1280, 800)
+    recording: str | Path,
+    png: str | Path,
+    *,
+    at: float | None = None,
+    size: tuple[int, int] = (1280, 800),
+    camera: Camera | None = None,
+    only_scene: bool = False,
 ) -> None:
     """Render a recording as the viewer shows it.
 
@@ -34,6 +42,8 @@ def picture(
         png: the picture to write.
         at: moment to show [s] from the start; its end when None.
         size: width and height of the viewer's window [points]; the picture has two pixels a point.
+        camera: from where the scene is looked at; as the recording says when None.
+        only_scene: the scene alone, without the window around it, its charts and tables.
 
     Raises:
         ViewerError: the viewer is not installed, cannot render here (it needs a Vulkan driver, such as Debian's
@@ -44,7 +54,7 @@ def picture(
     recording, png = Path(recording), Path(png)
     if not recording.is_file():
         raise ViewerError(f"{recording}: no such file")
-    with _viewer(recording.resolve(), size) as viewer:
+    with _arranged(recording.resolve(), camera, only_scene) as (file, view), _viewer(file, size) as viewer:
         began = time.monotonic()
         state = _when(viewer.get_state, lambda s: s.recordings and not s.loading, _LOADING, f"{recording}: not loaded")
         shown = state.recordings[0]
@@ -64,8 +74,23 @@ def picture(
                 raise ViewerError(f"{recording}: the viewer's picture did not come to rest in {_LOADING:.0f} s")
             time.sleep(_PAUSE)
             with contextlib.suppress(TimeoutError):  # the library gives a picture 15 s, a busy machine may need more
-                before, now = now or b"", viewer.take_screenshot()
+                before, now = now or b"", viewer.take_screenshot(view)
     write_file(png, now, named=True)
+
+
+@contextlib.contextmanager
+def _arranged(recording: Path, camera: Camera | None, only_scene: bool) -> Iterator[tuple[Path, Any]]:
+    """Give the recording itself or, where it is to be seen otherwise, another one that is gone afterwards; and a view.
+
+    The view is the scene's where that alone is wanted, and None for the whole window.
+    """
+    if camera is None and not only_scene:
+        yield recording, None
+        return
+    with own_folder() as folder:
+        target = folder / recording.name
+        view = write_rearranged(recording, target, camera=camera, only_scene=only_scene)
+        yield target, view
 
 
 @contextlib.contextmanager

@@ -22,6 +22,7 @@ from replay.numerics.columns import Field
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import read_events
 from replay.recording.events import Events
+from replay.recording.layout_message import TOPIC as LAYOUT
 from replay.recording.provenance import RECORD, Provenance, sha256
 from replay.sensing.kinds import KINDS, of_kind
 from replay.simulation import Layout
@@ -144,7 +145,7 @@ def read_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
 
 def own_topics(layout: Layout) -> set[str]:
     """Return the topics that a recording may have; those that another tool has added to it are none of them."""
-    return {FRAMES, "/tf", "/scene", EVENTS, "/collision", "/guards", *layout.topics()}
+    return {FRAMES, "/tf", "/scene", LAYOUT, EVENTS, "/collision", "/guards", *layout.topics()}
 
 
 class _Assembly:
@@ -168,7 +169,7 @@ class _Assembly:
             self._provenance = replace(self._provenance, layout=_reduced(self._provenance.layout, chosen))
         self._layout = self._provenance.layout
         self._with_events = EVENTS in chosen
-        self._topics = read_topics(log, (chosen | {FRAMES}) - {"/scene", EVENTS})
+        self._topics = read_topics(log, (chosen | {FRAMES}) - {"/scene", LAYOUT, EVENTS})
         self._frames = self._whole_frames()
 
     def recording(self) -> Recording:

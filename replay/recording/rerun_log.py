@@ -6,6 +6,7 @@ after it, as NaN, so that gaps stay gaps. The bytes differ from run to run; the 
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from replay.recording.blueprint_parts import recording_blueprint
 from replay.recording.events import EventFinder
 from replay.recording.rerun_columns import Chunks, Column, Index, column, entity, index_of, packed
 from replay.recording.rerun_file import RerunFile
-from replay.recording.rerun_scene import beam_path, body_path, extent, log_curve, log_scene
+from replay.recording.rerun_scene import CURVES, beam_path, body_path, extent, log_curve, log_scene
 from replay.recording.scene_view import SceneView
 from replay.simulation import FrameBlock, Layout
 
@@ -52,6 +53,7 @@ class RerunWriter:
         self._chunks: Any = None
         self._last: dict[str, Any] = {}
         self._named: set[tuple[str, str]] = set()
+        self._taken: dict[str, set[int]] = {}
         self._indexes: dict[bytes, Index] = {}
         self._members = self._bodies_of_pairs()
         self._corners = np.zeros((0, 3))
@@ -223,7 +225,7 @@ class RerunWriter:
         for chart, name, value in self._scene.thresholds:
             path = entity(chart, name)
             if (chart, name) not in self._named:
-                log_curve(self._chunks, path, name, self._number_of(chart))
+                log_curve(self._chunks, path, name, self._number_of(chart, name))
                 self._named.add((chart, name))
             self._send(block, ends, path, column("Scalars", "scalars", np.full(int(ends.sum()), value), 1))
 
@@ -245,14 +247,19 @@ class RerunWriter:
         for k in np.flatnonzero(rows.any(axis=0)).tolist():
             path = entity(chart, names[k])
             if (chart, names[k]) not in self._named:
-                log_curve(self._chunks, path, (titles or names)[k], self._number_of(chart))
+                log_curve(self._chunks, path, (titles or names)[k], self._number_of(chart, names[k]))
                 self._named.add((chart, names[k]))
             here = rows[:, k]
             self._send(block, here, path, column("Scalars", "scalars", shown[k, here], 1))
 
-    def _number_of(self, chart: str) -> int:
-        """Return the number of the curve that is added to a chart next."""
-        return sum(named == chart for named, _ in self._named)
+    def _number_of(self, chart: str, name: str) -> int:
+        """Return the number of a new curve's colour: it follows from its name, unless another of the chart has it."""
+        taken = self._taken.setdefault(chart, set())
+        first = zlib.crc32(name.encode()) % len(CURVES)
+        numbers = ((first + k) % len(CURVES) for k in range(len(CURVES)))
+        number = next((one for one in numbers if one not in taken), first)
+        taken.add(number)
+        return number
 
     def _log_events(self, block: FrameBlock) -> None:
         events = self._events.find(block)

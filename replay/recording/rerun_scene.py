@@ -78,7 +78,7 @@ def _face(corners: Floats, color: Color) -> list[Column]:
 
 
 def log_curve(chunks: Chunks, path: str, name: str, number: int) -> None:
-    """Log how a curve is called in its chart, and its colour: that of its number there."""
+    """Log how a curve is called in its chart, and its colour: that of a number."""
     color = CURVES[number % len(CURVES)]  # the viewer's own colours follow from names and may be alike
     chunks.add(path, {}, [row("SeriesLines", "names", [name]), *_curve(color)])
 

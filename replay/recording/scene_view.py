@@ -11,6 +11,7 @@ import numpy as np
 
 from replay.guarding.guard import PairLeaf, SensorLeaf, leaves
 from replay.numerics.arrays import Floats, Integers
+from replay.numerics.kept import kept
 from replay.recording.blueprint import CHARTED, CLEARANCE
 from replay.sensing.kind import Color, Drawing
 from replay.sensing.kinds import KINDS
@@ -104,6 +105,7 @@ class Meshes:
         return self.vertices[begin : self.first_vertex[k + 1]], index
 
 
+@kept
 def indexed(bodies: Sequence[Floats]) -> Meshes:
     """Return triangles (t, 3, 3) [m] of bodies with each vertex once: all in one pass, because bodies are many."""
     triangles = np.concatenate([np.zeros((0, 3, 3)), *bodies]) + 0.0  # -0.0 and 0.0 are one vertex
@@ -156,11 +158,7 @@ def _thresholds(scene: Scene) -> Iterator[tuple[str, str, float]]:
             if isinstance(leaf, PairLeaf) and leaf.below > 0.0:
                 yield CLEARANCE, f"{guard.name} acts", leaf.below
             if isinstance(leaf, SensorLeaf):
-                name, output = scene.layout.sensors[leaf.kind][leaf.column], KINDS[leaf.kind].output
-                assert output is not None
+                name = scene.layout.sensors[leaf.kind][leaf.column]
                 charts = {field.name: chart for chart, field in CHARTED[leaf.kind].items()}
                 measured = name in scene.layout.signals.get(leaf.kind, ())
-                place = (
-                    leaf.below if measured else output.charted(scene.scenario.sensors.of(leaf.kind)[name], leaf.below)
-                )
-                yield charts["measured"] if measured else leaf.kind, f"{guard.name} acts on {name}", place
+                yield charts["measured"] if measured else leaf.kind, f"{guard.name} acts on {name}", leaf.below

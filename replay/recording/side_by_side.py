@@ -40,7 +40,7 @@ def one_recording(files: Sequence[Path]) -> Iterator[Path]:
         ViewerError: a file cannot be read; the viewer would show nothing, or what is left of it.
     """
     if len(files) == 1:
-        with _readable(files[0]) as reader:
+        with readable(files[0]) as reader:
             for _ in reader.stream():
                 pass
         yield files[0]
@@ -67,9 +67,9 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
     try:
         stream = result.open("replay: side by side")
         stream.send_recording_name(" | ".join(sides))
-        found = _Contents()
+        found = Contents()
         for side, file in zip(sides, files, strict=True):
-            with _readable(file) as reader:
+            with readable(file) as reader:
                 found.look_from(reader)
                 for chunk in reader.stream():
                     _copy(stream, chunk, side, found)
@@ -82,7 +82,7 @@ def write_side_by_side(files: Sequence[Path], target: Path) -> None:
 
 
 @contextlib.contextmanager
-def _readable(file: Path) -> Iterator[Any]:
+def readable(file: Path) -> Iterator[Any]:
     """Open a file to be read within; ViewerError when it is cut, damaged or no recording."""
     from rerun.chunk import RrdReader
 
@@ -97,7 +97,7 @@ def _readable(file: Path) -> Iterator[Any]:
         raise ViewerError(f"{file}: cannot be read: {str(error).splitlines()[0]}") from None
 
 
-class _Contents:
+class Contents:
     """What the recordings have: charts, their end [ns], and from where to where each looks at its scene."""
 
     def __init__(self) -> None:
@@ -115,19 +115,23 @@ class _Contents:
                     eye, target = (np.array(batch.column(name).to_pylist()[-1][0]) for name in _EYE)
                     self.eyes.append((eye, target))
 
+    def take(self, chunk: Any) -> None:
+        """Take what a chunk of a recording has: curves of a chart, and times."""
+        top = str(chunk.entity_path).split("/")[1]
+        if top in blueprint.CHARTS:
+            self.charts.add(top)
+        batch = chunk.to_record_batch()
+        if blueprint.TIMELINE in chunk.timeline_names and len(batch):
+            times = batch.column(blueprint.TIMELINE).cast("int64").to_numpy(zero_copy_only=False)
+            self.end = max(self.end, int(times.max()))
 
-def _copy(stream: Any, chunk: Any, side: str, found: _Contents) -> None:
+
+def _copy(stream: Any, chunk: Any, side: str, found: Contents) -> None:
     """Send a chunk below the name of its side."""
     import rerun as rr
 
     path = str(chunk.entity_path)
     if path.startswith("/__"):  # properties of the recording itself
         return
-    batch = chunk.to_record_batch()
     stream.send_chunks(chunk.with_entity_path(f"{rr.new_entity_path([side])}{path}"))
-    top = path.split("/")[1]
-    if top in blueprint.CHARTS:
-        found.charts.add(top)
-    if blueprint.TIMELINE in chunk.timeline_names and len(batch):
-        times = batch.column(blueprint.TIMELINE).cast("int64").to_numpy(zero_copy_only=False)
-        found.end = max(found.end, int(times.max()))
+    found.take(chunk)

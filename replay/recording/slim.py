@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from replay import limits
 from replay.errors import RecordingError
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.logs.mcap_chunks import records, unpack
@@ -109,9 +110,14 @@ def _all_files(log: McapLog, provenance: Provenance) -> dict[str, bytes]:
 def _put(data: bytes, objects: Path) -> str:
     digest = sha256(data)
     place = objects / digest
-    if place.is_symlink() or not place.is_file() or place.read_bytes() != data:
+    if not _holds(place, data):
         write_file(place, data)
     return digest
+
+
+def _holds(file: Path, data: bytes) -> bool:
+    plain = not file.is_symlink() and file.is_file()
+    return plain and file.stat().st_size == len(data) and file.read_bytes() == data
 
 
 def _object(recording: Path, name: str, digest: str) -> bytes:
@@ -121,6 +127,9 @@ def _object(recording: Path, name: str, digest: str) -> bytes:
     place = next((place for place in places if place.is_file()), None)
     if place is None:
         raise RecordingError(str(recording), f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}")
+    size = place.stat().st_size
+    if size > limits.FILE:
+        raise RecordingError(str(place), f"has {size} bytes; at most {limits.FILE} are read")
     data = place.read_bytes()
     if is_lfs_pointer(data):
         raise RecordingError(str(place), LFS_POINTER)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from replay.numerics.arrays import Floats
+from replay.numerics.kept import kept
 from replay.recording.scene_view import Meshes
 
 _CREASE = 0.8
@@ -12,6 +13,7 @@ _CREASE = 0.8
 _MOST_NEIGHBOURS = 64  # faces at one vertex that are looked at together; the apex of a fine cone may have more
 
 
+@kept
 def corner_normals(meshes: Meshes) -> Floats:
     """Return a unit normal for each corner (t, 3, 3) of meshes: smooth over curved parts, sharp at edges.
 

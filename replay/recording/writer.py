@@ -13,6 +13,8 @@ from replay.recording import messages
 from replay.recording.event_messages import TOPIC as EVENTS
 from replay.recording.event_messages import encode
 from replay.recording.events import EventFinder
+from replay.recording.layout_message import TOPIC as LAYOUT
+from replay.recording.layout_message import layout_message
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.scene_update import scene_message
 from replay.recording.scene_view import SceneView
@@ -127,10 +129,12 @@ class McapWriter:
         collision = block.collision is not None
         kinds = {kind: columns.present() for kind, columns in block.readings.items()}
         topics = list(frame_topics(self._provenance.layout, collision=collision, kinds=kinds))
-        types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG})
+        types = sorted({topic.type for topic in topics} | {messages.SCENE, messages.LOG, messages.LAYOUT})
         schemas = {name: log.schema(messages.schema(name)) for name in types}
         scene = log.channel("/scene", schemas[messages.SCENE])
+        names = log.channel(LAYOUT, schemas[messages.LAYOUT])
         self._event_channel = log.channel(EVENTS, schemas[messages.LOG])
         self._topics = [(topic, log.channel(topic.name, schemas[topic.type])) for topic in topics]
         log.end_preamble()
         log.messages(scene, [0], [0], [self._scene_data])
+        log.messages(names, [0], [0], [layout_message(self._provenance.layout)])

@@ -64,13 +64,16 @@ class RobotMeshes:
             if ending not in (*FORMATS, _CONVERTED):
                 known = ", ".join((*FORMATS, _CONVERTED))
                 raise element.wrong(f"{written[:200]!r} ends in {found.path.suffix!r}; meshes are read from {known}")
-            size = found.path.stat().st_size
-            if size > limits.FILE:
-                raise element.wrong(f"{written[:200]!r} has {size} bytes; at most {limits.FILE} are read")
-            with found.path.open("rb") as file:
-                if is_lfs_pointer(file.read(1024)):
-                    raise element.wrong(f"{written[:200]!r} {LFS_POINTER}")
-            self._known[found.path] = self._placed(found.path, ending)
+            try:
+                size = found.path.stat().st_size
+                if size > limits.FILE:
+                    raise element.wrong(f"{written[:200]!r} has {size} bytes; at most {limits.FILE} are read")
+                with found.path.open("rb") as file:
+                    if is_lfs_pointer(file.read(1024)):
+                        raise element.wrong(f"{written[:200]!r} {LFS_POINTER}")
+                self._known[found.path] = self._placed(found.path, ending)
+            except OSError as error:
+                raise element.wrong(f"{written[:200]!r} cannot be read: {error.strerror}") from None
         return self._known[found.path]
 
     def save(self) -> None:

@@ -39,8 +39,8 @@ class Packages:
     def __init__(
         self, description: Path, given: Mapping[str, Path], environment: Mapping[str, str] | None = None
     ) -> None:
-        self._folder = description.resolve().parent
-        self._given = {name: folder.resolve() for name, folder in given.items()}
+        self._folder = _real(description).parent
+        self._given = {name: _real(folder) for name, folder in given.items()}
         self._environment = os.environ if environment is None else environment
         self._known: dict[str, tuple[Path, ...]] = {}
 
@@ -54,6 +54,12 @@ class Packages:
         Raises:
             RobotError: it is not there, with where it was looked for, or it is outside of what belongs to the robot.
         """
+        try:
+            return self._find(written, element)
+        except OSError as error:  # a name that is too long, a folder that may not be looked into
+            raise element.wrong(f"{written[:200]!r} cannot be looked for: {error.strerror}") from None
+
+    def _find(self, written: str, element: XmlElement) -> Found:
         text = unquote(written) if "%" in written else written
         if "\\" in text or "\0" in text:
             raise element.wrong(f"{written[:200]!r} is not a path that works everywhere; write / between folders")
@@ -81,7 +87,7 @@ class Packages:
         found: list[Path] = []
         for name, below in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"), ("COLCON_PREFIX_PATH", "")):
             entries = self._environment.get(name, "").split(os.pathsep)
-            found.extend(Path(entry).resolve() / below for entry in entries if entry)
+            found.extend(_real(Path(entry)) / below for entry in entries if entry)
         return tuple(found)
 
     def _in_package(self, text: str, written: str, element: XmlElement) -> Found:
@@ -109,7 +115,7 @@ class Packages:
     def _existing(self, path: Path, trees: Iterable[Path], written: str, element: XmlElement) -> Path:
         """Return a path that is a file; RobotError if it is none, or not in one of the trees."""
         found = Path(os.path.normpath(path))
-        real = found.resolve()
+        real = _real(found)
         if not any(real.is_relative_to(tree) for tree in trees):
             rule = "leads out of the robot's own folders; give the folder it is in with --package NAME=DIR"
             raise element.wrong(f"{written[:200]!r} {rule}")
@@ -120,7 +126,7 @@ class Packages:
     def _roots(self, name: str) -> tuple[Path, ...]:
         """Return the folders that may be a package, the likeliest first."""
         if name not in self._known:
-            self._known[name] = tuple(dict.fromkeys(folder.resolve() for folder in self._candidates(name)))
+            self._known[name] = tuple(dict.fromkeys(map(_real, self._candidates(name))))
         return self._known[name]
 
     def _candidates(self, name: str) -> Iterator[Path]:
@@ -144,6 +150,11 @@ class Packages:
             if name:
                 found.setdefault(folder, name)
         return found
+
+
+def _real(path: Path) -> Path:
+    """Return where a path leads; of links that go in a circle the path itself, which is no file."""
+    return Path(os.path.realpath(path))
 
 
 def _beside(folder: Path, name: str) -> Iterator[Path]:
@@ -193,7 +204,11 @@ def given(pairs: Iterable[str]) -> dict[str, Path]:
         name, _, folder = pair.partition("=")
         if not name or not folder:
             raise RobotError("--package", f"{pair!r} is not NAME=DIR")
-        if not Path(folder).is_dir():
-            raise RobotError("--package", f"{pair!r} names no folder")
+        try:
+            there = Path(folder).is_dir()
+        except OSError:  # a name that is too long, a folder that may not be looked into
+            there = False
+        if not there:
+            raise RobotError("--package", f"{pair[:200]!r} names no folder")
         found[name] = Path(folder)
     return found

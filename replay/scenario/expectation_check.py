@@ -19,9 +19,10 @@ from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.guard_outcomes import judge
 from replay.scenario.layout import Layout
+from replay.scenario.measures import Measure
 from replay.scenario.meetings import Clearances, Meetings, Seen, seen
 from replay.scenario.names import matches
-from replay.scenario.source import ScenarioProvenance
+from replay.scenario.source import ScenarioProvenance, dotted
 from replay.scenario.tallies import Count, Extremes, Tally
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
@@ -36,12 +37,14 @@ class Outcome:
         place: where it is written; None when the scenario was not read from text.
         passed: whether it held.
         detail: the values and times that decided.
+        measure: the number that decided; None of an earlier run that did not tell it.
     """
 
     expectation: str
     place: Place | None
     passed: bool
     detail: str
+    measure: Measure | None = None
 
 
 @dataclass(frozen=True)
@@ -122,12 +125,14 @@ class ExpectationCheck:
                     outcomes.append(Outcome(text, self._provenance.place((*check.path, *path)), passed, detail))
                 continue
             passed, detail = check.state.result(check.what)
-            outcomes.append(Outcome(check.text, self._provenance.place(check.path), passed, detail))
+            measure = check.state.measure(dotted(check.path))
+            outcomes.append(Outcome(check.text, self._provenance.place(check.path), passed, detail, measure))
         return outcomes
 
     def _add_pairs(self, path: tuple[str | int, ...], expected: PairExpectation) -> None:
         columns = matching_pairs(self._layout.pairs, expected.pair)
         about = " | ".join(expected.pair)
+        names = [self._layout.pairs[k].replace("|", " | ") for k in columns.tolist()]
 
         def reaches(level: Level) -> Callable[[_Block], Seen]:
             def take(block: _Block) -> Seen:
@@ -141,19 +146,21 @@ class ExpectationCheck:
             window = (round(begin * 1e9), round(end * 1e9))
             text = f"{about}: contact begins between {begin:.6g} s and {end:.6g} s"
             self._checks.append(
-                _Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), Meetings(window=window))
+                _Check(
+                    text, (*path, "contact"), "contact", reaches(Level.CONTACT), Meetings(window=window, names=names)
+                )
             )
         elif expected.contact is not None:
             text = f"{about}: contact {expected.contact}"
-            state = Meetings(expected.contact)
+            state = Meetings(expected.contact, names=names)
             self._checks.append(_Check(text, (*path, "contact"), "contact", reaches(Level.CONTACT), state))
         if expected.bounds is not None:
-            text, state = f"{about}: bounds {expected.bounds}", Meetings(expected.bounds)
+            text, state = f"{about}: bounds {expected.bounds}", Meetings(expected.bounds, names=names)
             self._checks.append(_Check(text, (*path, "bounds"), "bounds meet", reaches(Level.BOUNDS), state))
         if expected.clearance is not None:
             least = expected.clearance.min
 
-            def clearance(block: _Block) -> tuple[Floats, Floats, Seen]:
+            def clearance(block: _Block) -> tuple[Floats, Floats, Seen, Integers]:
                 assert block.collision is not None
                 part = block.collision.clearance[:, columns]
                 known = block.collision.evaluated[:, columns]
@@ -165,10 +172,11 @@ class ExpectationCheck:
                 if block.collision.clearance_bound is not None:
                     bounds = np.fmin.reduce(block.collision.clearance_bound[:, columns], axis=1)
                 contact = seen(block.collision, columns, Level.CONTACT)
-                return np.where(unknown, math.nan, smallest), bounds, contact
+                which = np.argmin(values, axis=1) if values.shape[1] else np.zeros(len(values), dtype=np.int64)
+                return np.where(unknown, math.nan, smallest), bounds, contact, which
 
             complete = self._clearance != "near" or least > self._margin
-            tally = Clearances(Extremes("m", low=least, complete=complete))
+            tally = Clearances(Extremes("m", low=least, complete=complete), meetings=Meetings("never", names=names))
             text = f"{about}: clearance >= {least:.6g} m"
             self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, tally))
 
@@ -192,6 +200,16 @@ class ExpectationCheck:
                     add(f"{symbol} {value:.6g} {expected.unit}", (*here, bound), state)
         elif asked is not None:
             add(asked, here, Count(asked))
+
+
+def clearance_limits(expectations: Sequence[Part], pairs: Sequence[str]) -> dict[str, float]:
+    """Return the smallest clearance [m] that is expected of each pair of which one is; the strictest of several."""
+    found: dict[str, float] = {}
+    for expected in expectations:
+        if isinstance(expected, PairExpectation) and expected.clearance is not None:
+            for index in matching_pairs(pairs, expected.pair).tolist():
+                found[pairs[index]] = max(found.get(pairs[index], 0.0), expected.clearance.min)
+    return found
 
 
 def matching_pairs(pairs: Sequence[str], patterns: tuple[str, str]) -> NDArray[np.intp]:

@@ -59,65 +59,69 @@ class FreePart(JointPart):
     type: Literal["free"]
 
 
-class RevolutePart(JointPart):
+class AxisPart(JointPart):
+    """What all joints have in common that have one position, along or about an axis."""
+
+    type: Literal["revolute", "continuous", "prismatic"]
+    axis: Axis = (0.0, 0.0, 1.0)
+    """Axis in the joint's frame; it is normalised."""
+    initial: float | None = None
+    """Position [rad or m] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the
+    one nearest to 0."""
+    mimic: MimicPart | None = None
+    """The joint that this one follows; nothing else moves it then."""
+
+    @model_validator(mode="after")
+    def _leads_or_follows(self) -> Self:
+        if self.mimic is not None and self.initial is not None:
+            rule = f"has no effect on a joint that follows {self.mimic.joint!r}; remove it"
+            raise rejected(rule, at=("initial",))
+        return self
+
+
+class TurningPart(AxisPart):
+    """What all joints have in common that turn."""
+
+    type: Literal["revolute", "continuous"]
+    initial: Angle | None = None
+    """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
+    nearest to 0."""
+    velocity: MaxAngularVelocity = math.inf
+    """Limit of the absolute velocity [rad/s]; moves need one."""
+    acceleration: MaxAngularAcceleration = math.inf
+    """Limit of the absolute acceleration [rad/s^2]; moves need one."""
+    deceleration: MaxAngularAcceleration | None = None
+    """Limit of the absolute acceleration while the joint slows down [rad/s^2]; `acceleration` when left out."""
+
+
+class RevolutePart(TurningPart):
     """Turns about an axis."""
 
     type: Literal["revolute"]
-    axis: Axis = (0.0, 0.0, 1.0)
-    """Axis in the joint's frame; it is normalised."""
     lower: AngleLimit = -math.inf
     """Lower position limit [rad]."""
     upper: AngleLimit = math.inf
     """Upper position limit [rad]."""
-    velocity: MaxAngularVelocity = math.inf
-    """Limit of the absolute velocity [rad/s]; moves need one."""
-    acceleration: MaxAngularAcceleration = math.inf
-    """Limit of the absolute acceleration [rad/s^2]; moves need one."""
-    deceleration: MaxAngularAcceleration | None = None
-    """Limit of the absolute acceleration while the joint slows down [rad/s^2]; `acceleration` when left out."""
-    initial: Angle | None = None
-    """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
-    nearest to 0."""
-    mimic: MimicPart | None = None
-    """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
-    def _sensible(self) -> Self:
+    def _within_limits(self) -> Self:
         _check_limits(self, "rad")
-        _check_initial(self)
         return self
 
 
-class ContinuousPart(JointPart):
+class ContinuousPart(TurningPart):
     """Turns about an axis without position limits."""
 
     type: Literal["continuous"]
-    axis: Axis = (0.0, 0.0, 1.0)
-    """Axis in the joint's frame; it is normalised."""
-    velocity: MaxAngularVelocity = math.inf
-    """Limit of the absolute velocity [rad/s]; moves need one."""
-    acceleration: MaxAngularAcceleration = math.inf
-    """Limit of the absolute acceleration [rad/s^2]; moves need one."""
-    deceleration: MaxAngularAcceleration | None = None
-    """Limit of the absolute acceleration while the joint slows down [rad/s^2]; `acceleration` when left out."""
-    initial: Angle | None = None
-    """Position [rad] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
-    nearest to 0."""
-    mimic: MimicPart | None = None
-    """The joint that this one follows; nothing else moves it then."""
-
-    @model_validator(mode="after")
-    def _sensible(self) -> Self:
-        _check_initial(self)
-        return self
 
 
-class PrismaticPart(JointPart):
+class PrismaticPart(AxisPart):
     """Slides along an axis."""
 
     type: Literal["prismatic"]
-    axis: Axis = (0.0, 0.0, 1.0)
-    """Axis in the joint's frame; it is normalised."""
+    initial: Length | None = None
+    """Position [m] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
+    nearest to 0."""
     lower: LengthLimit = -math.inf
     """Lower position limit [m]."""
     upper: LengthLimit = math.inf
@@ -128,16 +132,10 @@ class PrismaticPart(JointPart):
     """Limit of the absolute acceleration [m/s^2]; moves need one."""
     deceleration: MaxAcceleration | None = None
     """Limit of the absolute acceleration while the joint slows down [m/s^2]; `acceleration` when left out."""
-    initial: Length | None = None
-    """Position [m] while nothing has moved the joint; when left out, that of the pose `motion.initial`, or the one
-    nearest to 0."""
-    mimic: MimicPart | None = None
-    """The joint that this one follows; nothing else moves it then."""
 
     @model_validator(mode="after")
-    def _sensible(self) -> Self:
+    def _within_limits(self) -> Self:
         _check_limits(self, "m")
-        _check_initial(self)
         return self
 
 
@@ -147,12 +145,6 @@ def _check_limits(joint: RevolutePart | PrismaticPart, unit: str) -> None:
     if joint.initial is not None and not joint.lower <= joint.initial <= joint.upper:
         between = f"between the limits {joint.lower:.6g} {unit} and {joint.upper:.6g} {unit}"
         raise rejected(f"must be {between}", at=("initial",))
-
-
-def _check_initial(joint: RevolutePart | ContinuousPart | PrismaticPart) -> None:
-    if joint.mimic is not None and joint.initial is not None:
-        rule = f"has no effect on a joint that follows {joint.mimic.joint!r}; remove it"
-        raise rejected(rule, at=("initial",))
 
 
 Joint = Annotated[FixedPart | RevolutePart | ContinuousPart | PrismaticPart | FreePart, Field(discriminator="type")]

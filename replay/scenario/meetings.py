@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,9 @@ from replay.collision.columns import Between, CollisionColumns, Level
 from replay.errors import count
 from replay.language.fields import When
 from replay.numerics.arrays import Flags, Floats, Integers
-from replay.scenario.tallies import Extremes, shown_seconds
+from replay.numerics.constants import SECOND
+from replay.scenario.measures import Measure
+from replay.scenario.tallies import Extremes, frames_measure, shown_seconds
 
 _NARROW = 10_000
 """A bracket up to so many nanoseconds is told by the shortest number in it, a wider one by its end."""
@@ -82,6 +84,8 @@ class Meetings:
 
     Attributes:
         when: what is expected; None when only the first meeting counts, see `begins_within`.
+        names: of the pairs, as people read them.
+        which: the pair that meets first.
     """
 
     when: When | None = None
@@ -94,6 +98,8 @@ class Meetings:
     alone: _Intervals = field(default_factory=_Intervals)
     unproven: _Intervals = field(default_factory=_Intervals)
     surely_first: bool = True
+    names: Sequence[str] = ()
+    which: int | None = None
     _last: Flags | None = None
 
     def update(self, time_ns: Integers, block: Seen) -> None:
@@ -125,7 +131,7 @@ class Meetings:
         met = self.count + self.alone.number > 0
         if self.alone.number:
             text = f"{what} {self.alone}" if not self.count else f"{text} and {self.alone}"
-        text += "" if self.first is None else f", first at {shown(self.first)}"
+        text += "" if self.first is None else f", {self._who}first at {shown(self.first)}"
         text += "" if self.until is None else f", until {shown(self.until)}"
         if self.when == "never" and not met and self.unproven.number:
             return False, f"{text}, not proven {self.unproven}"
@@ -136,7 +142,31 @@ class Meetings:
         if self.first is None:
             return False, f"{what} in no frame{doubt}"
         inside = self.window[0] <= self.first[1] and self.first[0] <= self.window[1]
-        return inside and not doubt, f"{what} begins at {shown(self.first)}{doubt}"
+        who = f" of {self.subject}" if self.subject else ""
+        return inside and not doubt, f"{what}{who} begins at {shown(self.first)}{doubt}"
+
+    def measure(self, name: str) -> Measure:
+        """See `Tally`: in how many frames and intervals between them pairs met, or when they first did."""
+        first = None if self.first is None else self.first[1]
+        if self.when is not None:
+            at = first if self.when != "always" else None if self.first_not is None else self.first_not[1]
+            number = self.count + self.alone.number
+            subject = self.subject if self.when != "always" else ""
+            return frames_measure(name, self.when, number, self.frames, at, subject)
+        if first is None:
+            return Measure(name, None, "s", limit=self.window[0] / SECOND)
+        early, late = (first - self.window[0]) / SECOND, (self.window[1] - first) / SECOND
+        limit = self.window[0 if early < late else 1] / SECOND
+        return Measure(name, first / SECOND, "s", first / SECOND, self.subject, limit, min(early, late))
+
+    @property
+    def subject(self) -> str:
+        """The pair that meets first; "" when none does, or where pairs have no names."""
+        return "" if self.which is None or not self.names else self.names[self.which]
+
+    @property
+    def _who(self) -> str:
+        return f"{self.subject} " if self.subject else ""
 
     def _find_first(self, time_ns: Integers, block: Seen, met: Flags, begin: int) -> None:
         """Look for the first meeting: the crossing with which it begins, else the frame that shows it."""
@@ -147,8 +177,11 @@ class Meetings:
         self.first = int(time_ns[at]), int(time_ns[at])
         mine = np.flatnonzero(block.frame == begin + at)
         begins = mine[block.begins[mine]]
+        shown_ = block.reached[at] if block.reached[at].any() else block.inside[at]
+        self.which = int(np.argmax(shown_)) if shown_.any() else None
         if len(begins):
             one = begins[0]
+            self.which = int(block.pair[one])
             self.first = int(block.earliest[one]), int(block.latest[one])
             ends = mine[~block.begins[mine] & (block.pair[mine] == block.pair[one]) & (mine > one)]
             if len(ends) and not block.reached[at].any():
@@ -183,10 +216,14 @@ class Clearances:
     bound: float = np.inf
     meetings: Meetings = field(default_factory=lambda: Meetings("never"))
 
-    def update(self, time_ns: Integers, block: tuple[Floats, Floats, Seen]) -> None:
-        """Take smallest clearances and bounds, (n,) [m] each, NaN for none, and how the pairs meet; see `Tally`."""
-        values, bounds, meetings = block
-        self.sampled.update(time_ns, values)
+    def update(self, time_ns: Integers, block: tuple[Floats, Floats, Seen, Integers]) -> None:
+        """Take smallest clearances and bounds, (n,) [m] each, NaN for none, and how the pairs meet; see `Tally`.
+
+        The last is (n,) which of the pairs has the smallest.
+        """
+        values, bounds, meetings, which = block
+        names = self.meetings.names
+        self.sampled.update(time_ns, values, [names[k] for k in which.tolist()] if names else None)
         self.meetings.update(time_ns, meetings)
         self.bound = float(np.nanmin(bounds, initial=self.bound))
 
@@ -196,12 +233,21 @@ class Clearances:
         met = self.meetings
         if met.alone.number:
             assert met.first is not None
-            return False, f"{text}; 0 m {met.alone}, first at {shown(met.first)}"
+            who = f"{met.subject} " if met.subject else ""
+            return False, f"{text}; 0 m {met.alone}, {who}first at {shown(met.first)}"
         if met.unproven.number:
             return False, f"{text}, not proven {met.unproven}"
         if 0.0 < self.bound < np.inf:
             text += f", proven at least {self.bound:.6g} m between frames"
         return passed, text
+
+    def measure(self, name: str) -> Measure:
+        """See `Tally`."""
+        met, limit = self.meetings, self.sampled.low
+        if met.alone.number and met.first is not None:
+            margin = None if limit is None else -limit
+            return Measure(name, 0.0, "m", met.first[1] / SECOND, met.subject, limit, margin)
+        return self.sampled.measure(name)
 
 
 def shown(bracket: tuple[int, int]) -> str:

@@ -12,6 +12,7 @@ from replay.guarding.part import ReleasePart, parts_of, sensors_of
 from replay.language.fields import Part
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.names import matches
+from replay.scenario.unit_slips import beyond_a_turn
 from replay.sensing.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def notes(
         window = expected.contact if isinstance(expected, PairExpectation) else None
         if isinstance(window, BetweenPart) and window.between[1] > end:
             found.append(problem(("expect", index, "contact", "between", 1), f"is {after}"))
+    found.extend(beyond_a_turn(scenario))
     found.extend(_sensor_notes(scenario, model or scenario.model))
     found.extend(_guard_notes(scenario))
     if (model or scenario.model).collision.between == "sampled":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os
 import posixpath
 import re
 from collections.abc import Mapping
@@ -174,7 +175,7 @@ class Folder:
         if name.startswith(PACKAGE):
             return _read(_in_package(name))
         path = self.folder / name
-        if name != self.main and not path.resolve().is_relative_to(self.folder.resolve()):
+        if name != self.main and not _real(path).is_relative_to(_real(self.folder)):
             raise SourceRule("is a link that leads out of the scenario's folder; copy the file there")
         return _read(path)
 
@@ -214,6 +215,19 @@ class Remembered:
         if name not in self._files:
             self._files[name] = self._library.read(name)
         return self._files[name]
+
+
+def _real(path: Path) -> Path:
+    """Return where a path leads; of links that go in a circle the path itself, and reading it says so."""
+    return Path(os.path.realpath(path))
+
+
+def _may_be(path: Path) -> bool:
+    """Return whether a path is there, or cannot be looked for: reading it says why."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
 
 
 def _read(path: Path) -> bytes:
@@ -267,8 +281,8 @@ def _in_package(name: str) -> Path:
     folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
     for folder in folders:
         file = folder / path
-        if file.exists():
-            if not file.resolve().is_relative_to(folder.resolve()):
+        if _may_be(file):
+            if not _real(file).is_relative_to(_real(folder)):
                 raise SourceRule(f"is a link that leads out of the package {package!r}")
             return file
     if not folders:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from replay.errors import CalibrationError, InvalidValue
 from replay.numerics.arrays import Floats
+from replay.sensing.capacitive.part import SUPPLY
 from replay.sensing.robust_fit import robust_fit
 
 Quantity = Literal["capacitance", "delta_output"]
@@ -104,7 +105,7 @@ def calibrate(
     *,
     quantity: Quantity,
     coupling: float,
-    supply: float = 2.5,
+    supply: float = SUPPLY,
     stray_capacitance: float = 0.0,
     offset: bool = False,
     absolute: tuple[float, float] | None = None,

@@ -8,7 +8,7 @@ description imports at its top must be light: `replay validate` loads it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -83,8 +83,6 @@ class Output:
         condition: what a guard may ask of it, as it is written; the key `name` of the kind names the sensor.
         threshold: takes such a condition, returns below which value it holds.
         dimension: of the reading.
-        charted: takes a sensor as it is written and a threshold, returns where this is in the first chart of the kind;
-            in that of `measured` it is itself.
     """
 
     reading: Callable[[Any], Floats]
@@ -93,7 +91,6 @@ class Output:
     condition: type[Part]
     threshold: Callable[[Any], float]
     dimension: Dimension
-    charted: Callable[[Any, float], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +120,7 @@ class SensorKind(ABC):
         part: a sensor as it is written; `link` and `ignore` are among its keys.
         method: its methods as they are written.
         revisions: of each method; raised when its results change beyond the shipped rules, recorded with every result.
+        slow: the methods that take seconds a frame.
         models: its method in built-in models, by their names.
         expectation: what can be expected, as it is written; the key `name` names the sensor.
         expected: the same, as what is taken from the columns.
@@ -135,6 +133,7 @@ class SensorKind(ABC):
     part: type[Part]
     method: type[Method]
     revisions: ClassVar[Mapping[str, int]]
+    slow: ClassVar[Collection[str]] = ()
     models: ClassVar[Mapping[str, Method]] = {}
     expectation: type[Part]
     expected: Sequence[Expected]

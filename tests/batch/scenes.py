@@ -4,7 +4,10 @@ import os
 import time
 
 from replay.batch.case import CaseResult, run_case
+from replay.batch.run import Execution
 from replay.scenario.load import load_sources
+
+TWO = Execution(workers=2)
 
 TEXT = """
 version: 1

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from replay.batch.baseline import Baseline, Entry
 from replay.batch.history import Night, append_night, failing_since, read_history
 from replay.batch.select import load_all
 from replay.comparison.runs import diff
-from replay.errors import RecordingError
+from replay.errors import RecordingError, WriteError
 from replay.geometry import primitives
 from replay.recording.slim import attached_files
 from replay.recording.summary import summarize
@@ -198,3 +199,33 @@ def test_a_pointer_of_git_lfs_in_place_of_a_mesh_or_a_recording_is_told_as_one(r
     baseline.recording("a").write_text(pointer)
     with pytest.raises(RecordingError, match=r"a.mcap: is a Git LFS pointer.*git lfs pull"):
         diff(baseline.recording("a"), run / "a" / "a.mcap")
+
+
+def test_a_mesh_that_is_too_large_is_not_read_and_replaced(run, tmp_path):
+    baseline = Baseline(tmp_path)
+    baseline.store(entries(run, "a"), reason="first", now=NOW)
+    (mesh,) = (tmp_path / "objects").iterdir()
+    data = mesh.read_bytes()
+    with mesh.open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(RecordingError, match="has 1099511627776 bytes; at most 1073741824 are read"):
+        attached_files(baseline.recording("a"))
+    baseline.store(entries(run, "b"), reason="second", now=NOW)
+    assert mesh.read_bytes() == data
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: os.mknod(path, 0o20644, os.makedev(1, 5))])
+def test_results_are_kept_in_files_alone(run, tmp_path, make):
+    log = tmp_path / "accepted.jsonl"
+    try:
+        make(log)  # /dev/zero never ends, and a pipe never begins
+    except PermissionError:
+        pytest.skip("only root makes devices")
+    with pytest.raises(WriteError, match=r"accepted\.jsonl: cannot be written: it is a pipe or a device"):
+        Baseline(tmp_path).store(entries(run, "a"), reason="x", now=NOW)
+    assert read_history(log) == []
+    with pytest.raises(WriteError, match="it is a pipe or a device"):
+        append_night(log, Night("now", "1", {}, frozenset()))
+    log.unlink()
+    Baseline(tmp_path).store({}, reason="the rest", now=NOW)
+    assert Baseline(tmp_path).names() == ["a"]

@@ -94,3 +94,15 @@ def test_names_that_differ_otherwise_are_taken(tmp_path):
     for number, name in enumerate(("a", "a1", "a-1", "ä", "a.1")):
         write(tmp_path / f"{number}.yaml", name)
     assert len(load_all([tmp_path])) == 5
+
+
+def test_of_a_file_that_is_too_large_for_yaml_no_more_is_read(tmp_path):
+    write(tmp_path / "a.yaml", "a")
+    for name in ("data.yaml", "scenario.yaml"):
+        with (tmp_path / name).open("wb") as file:
+            file.write(b"version: 1\n" * name.startswith("scenario"))
+            file.truncate(1 << 40)
+    assert [path.name for path in find_scenarios([tmp_path])] == ["a.yaml", "scenario.yaml"]
+    selection = Selection.of([tmp_path], (), None)
+    assert [scenario.name for scenario in selection.chosen] == ["a"]
+    assert "at most 1073741824 are read" in str(selection.failed[0].error)

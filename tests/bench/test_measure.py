@@ -100,7 +100,7 @@ def test_report_as_json_and_as_a_page_that_needs_no_other_file(tmp_path):
     found = json.loads(data.read_text())
     assert set(found) == {"machine", "goals", "benchmarks"}
     assert set(found["benchmarks"]) == {"test", "second"}
-    assert set(found["benchmarks"]["test"]) == {"tables", "grids", "goals", "notes"}
+    assert set(found["benchmarks"]["test"]) == {"said", "seconds", "tables", "grids", "goals", "notes"}
     ours, peer = found["benchmarks"]["test"]["tables"]["table <1>"]
     assert ours["median"] > 0.0
     assert (peer["median"], peer["note"]) == (None, "not installed")

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from replay.bench import broad_phase, scaling
+from replay.bench import broad_phase, scaling, set_up
 from replay.bench.report import Report
 
 pytestmark = pytest.mark.compiled  # it measures them
@@ -17,6 +17,7 @@ def test_every_law_has_points_and_an_exponent(small, monkeypatch):
     monkeypatch.setattr(scaling, "TRIANGLES", (100, 400))
     monkeypatch.setattr(scaling, "SENSORS", (1, 3))
     monkeypatch.setattr(broad_phase, "growth", lambda *_, **__: None)  # has a test of its own
+    monkeypatch.setattr(set_up, "growth", lambda *_, **__: None)
     monkeypatch.setattr(scaling, "workers", lambda *_: scaling.Grid([{"workers": 1}]))  # so has this
     report = scaling.run(rounds=1, scene=small)
     assert len(report.tables) == len(report.plots) == 3
@@ -38,6 +39,15 @@ def test_readings_that_are_none_are_wrong():
     assert not scaling._seen(np.array([[math.nan, 1.0]])).failed
     assert scaling._felt(np.array([[math.nan]])).failed
     assert scaling._felt(np.array([[-1.0]])).failed
+
+
+def test_set_up_is_timed_for_each_body():
+    report = Report("scaling")
+    set_up.growth(report, sizes=(300, 2000), rounds=1)
+    (rows,) = report.tables.values()
+    counts = [int(row.case.split()[-2]) for row in rows]
+    assert len(rows) == 6 and counts == pytest.approx([300, 2000] * 3, rel=0.4)
+    assert all(row.median > 0.0 for row in rows) and len(report.notes) == 3
 
 
 def test_growth_needs_two_sizes():

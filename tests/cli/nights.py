@@ -1,6 +1,9 @@
 """Nights for tests: their scenarios, the command, and what it has reported."""
 
+import base64
 import json
+import re
+import zlib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -26,6 +29,16 @@ def junit_of(folder):
         assert int(suite.get(attribute)) == list(cases.values()).count(tag)
     assert int(suite.get("tests")) == len(cases)
     return cases
+
+
+def rows_of(folder):
+    """Return the rows of a night's page in their order: name, and what the page's script shows of it."""
+    packed = re.search('<div id="data" hidden>([^<]*)</div>', (folder / "index.html").read_text())[1]
+    data = json.loads(zlib.decompress(base64.b64decode(packed)))
+    return {
+        name: {"address": address, "verdict": data["verdicts"][verdict][1], "message": message, "since": since}
+        for name, address, verdict, _, _, message, since, *_ in data["rows"]
+    }
 
 
 def night(folder, output, *more):

@@ -77,3 +77,46 @@ def test_a_run_of_another_model_or_text_is_accepted_anew_although_it_reads_the_s
     assert run(accept) is ExitCode.FINE
     counts = "0 to be accepted, 1 unchanged" if changed == "nothing" else "1 to be accepted, 0 unchanged"
     assert counts in capsys.readouterr().out
+
+
+def changed_night(tmp_path):
+    prepare(tmp_path, plain=2, bad=0, differing=2)
+    path = tmp_path / "in" / "plain_1.yaml"
+    path.write_text(path.read_text().replace("aperture: 20 deg", "aperture: 30 deg"))
+    scenes.write(tmp_path / "in", "plain_0", contact="always")
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.FAILED
+    return ["accept", str(tmp_path / "out"), "--baseline", str(tmp_path / "base"), "--yes", "--reason", "x"]
+
+
+def test_a_night_is_accepted_in_parts(tmp_path, capsys):
+    accept = changed_night(tmp_path)
+    log = tmp_path / "base" / "accepted.jsonl"
+    capsys.readouterr()
+    assert run([*accept, "--group", "no such"]) is ExitCode.INVALID
+    assert "its groups are: expect[0].contact never -> always; sensors.distance.tip.aperture" in capsys.readouterr().err
+    assert run([*accept, "--select", "p*"]) is ExitCode.INVALID
+    assert "did not pass: plain_0 (broken); --except NAME leaves one out" in capsys.readouterr().err
+    for part, names in [
+        (["--group", "wall/slab pose.xyz[[]0] 1.2 -> 1.25 m", "--except", "*_1"], ["differ_0"]),
+        (["--group", "wall/slab pose.xyz[0] 1.2 -> 1.25 m"], ["differ_1"]),
+        (["--select", "p*", "--except", "plain_0"], ["plain_1"]),
+    ]:
+        assert run([*accept, *part]) is ExitCode.FINE
+        assert list(json.loads(log.read_text().splitlines()[-1])["scenarios"]) == names
+    assert night(tmp_path, tmp_path / "again", "--rrd", "none") is ExitCode.FAILED
+    assert verdicts_of(tmp_path / "again") == dict.fromkeys(["differ_0", "differ_1", "plain_1"], "same") | {
+        "plain_0": "broken"
+    }
+
+
+def test_a_rule_may_be_for_some_scenarios_alone(tmp_path, capsys):
+    prepare(tmp_path, plain=0, bad=0, differing=2)
+    rules = tmp_path / "in" / "rules.yaml"
+    rule = "{signal: '*', scenario: SCENARIO, ignore: true, reason: the wall is being moved, expires: 2999-01-31}"
+    for scenario, verdicts in [("differ_0", ("same", "different")), ("['x', '*_1']", ("different", "same"))]:
+        rules.write_text(f"rules_version: 1\nrules:\n  - {rule.replace('SCENARIO', scenario)}\n")
+        assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.DIFFERENT
+        assert tuple(verdicts_of(tmp_path / "out").values()) == verdicts
+    rules.write_text(f"rules_version: 1\nrules:\n  - {rule.replace('SCENARIO', '3')}\n")
+    assert night(tmp_path, tmp_path / "out", "--rrd", "none") is ExitCode.INVALID
+    assert "must be the name of a scenario or a pattern" in capsys.readouterr().err

@@ -34,7 +34,8 @@ expect:
   - {pair: [cube, plate], contact: WHEN}
 model: {collision: {between: MODEL}}
 """
-CONTACT = "contact between frames 4 and 5, first at 0.46 s, until 0.49 s"
+PAIR = "cube/block | plate/sheet"
+CONTACT = f"contact between frames 4 and 5, {PAIR} first at 0.46 s, until 0.49 s"
 LINE = "contact between frames 4 and 5, from 0.46 s until 0.49 s: cube/block | plate/sheet"
 RULES = str(Path(__file__).parents[2] / "scenarios" / "rules.yaml")
 
@@ -73,10 +74,10 @@ def test_expectations_count_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
         f"FAIL cube | plate: contact never ({CONTACT})",
         f"ok   cube | plate: contact sometimes ({CONTACT})",
         "FAIL cube | plate: contact always (contact in 0 of 11 frames, first not at 0 s)",
-        "ok   cube | plate: contact begins between 0.46 s and 0.47 s (contact begins at 0.46 s)",
-        "FAIL cube | plate: contact begins between 0.5 s and 0.6 s (contact begins at 0.46 s)",
+        f"ok   cube | plate: contact begins between 0.46 s and 0.47 s (contact of {PAIR} begins at 0.46 s)",
+        f"FAIL cube | plate: contact begins between 0.5 s and 0.6 s (contact of {PAIR} begins at 0.46 s)",
         "FAIL cube | plate: clearance >= 0.001 m "
-        "(smallest clearance 0.02 m at 0.5 s; 0 m between frames 4 and 5, first at 0.46 s)",
+        f"(smallest clearance 0.02 m of {PAIR} at 0.5 s; 0 m between frames 4 and 5, {PAIR} first at 0.46 s)",
     ]
 
 
@@ -148,7 +149,7 @@ def test_a_night_shows_it_in_every_report(tmp_path: Path, capsys: pytest.Capture
         RULES,
     ]
     assert run([*night, "--missing-baseline", "create", "--rrd", "none"]) is ExitCode.FINE
-    page = unescape((tmp_path / "night" / "index.html").read_text())
+    page = unescape((tmp_path / "night" / "tunnel" / "report.html").read_text())
     assert LINE in page and CONTACT in page
     suite = ElementTree.parse(tmp_path / "night" / "junit.xml").getroot().find("testsuite")
     assert suite is not None and suite.findtext("system-out") == f"tunnel: {LINE}"

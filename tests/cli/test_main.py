@@ -46,6 +46,38 @@ def test_usage_and_unreadable_input_are_exit_code_2(arguments, message, capsys):
     assert said.startswith("replay: error: ") and said.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("name", "reason"), [("a" * 300, "File name too long"), ("circle/x", "Too many levels of symbolic links")]
+)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "NAME"],
+        ["run", "x", "-o", "NAME"],
+        ["validate", "NAME"],
+        ["info", "NAME"],
+        ["export", "NAME", "--format", "csv"],
+        ["diff", "NAME", "x"],
+        ["regress", "x", "--baseline", "NAME"],
+        ["accept", "NAME", "--baseline", "x", "--reason", "why"],
+        ["view", "NAME"],
+        ["import", "NAME", "-o", "x.yaml"],
+        ["import", "x.urdf", "-o", "NAME"],
+        ["import", "x.urdf", "-o", "x.yaml", "--package", "a=NAME"],
+        ["calibrate", "x", "--curve", "NAME"],
+    ],
+    ids=" ".join,
+)
+def test_a_name_that_no_file_can_have_is_one_line(arguments, name, reason, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("circle").symlink_to("circle")
+    Path("x.urdf").write_text("<robot name='r'><link name='a'/></robot>")
+    assert run([argument.replace("NAME", name) for argument in arguments]) is ExitCode.INVALID
+    said = capsys.readouterr().err
+    assert reason in said or "names no folder" in said
+    assert said.startswith("replay: error: ") and said.count("\n") == 1
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a system without /dev/full")
 def test_a_result_that_standard_output_has_no_space_for_is_one_line(scenario):
     with Path("/dev/full").open("w") as full:

@@ -7,21 +7,21 @@ import sys
 
 import pytest
 
-from replay.batch import regress
+from replay.batch import judge
 from replay.batch.baseline import Baseline
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.errors import RecordingError
 from tests.batch import scenes
-from tests.cli.nights import junit_of, night, prepare, verdicts_of
+from tests.cli.nights import junit_of, night, prepare, rows_of, verdicts_of
 
 INTERRUPTED = """
 import signal, sys, time
-import replay.batch.regress as regress
+import replay.batch.judge as judge
 from replay.cli.main import main
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-read_pair = regress.read_pair
+read_pair = judge.read_pair
 
 def slow(baseline, candidate, **rules):
     if candidate.stem == "b":
@@ -29,7 +29,7 @@ def slow(baseline, candidate, **rules):
         time.sleep(60)
     return read_pair(baseline, candidate, **rules)
 
-regress.read_pair = slow
+judge.read_pair = slow
 main(sys.argv[1:])
 """
 
@@ -102,7 +102,7 @@ def test_a_night_that_could_not_be_reported_is_not_begun(tmp_path, capsys):
 def test_one_odd_baseline_never_ends_a_night(tmp_path, monkeypatch, capsys):
     """Whatever is odd about one comparison, in a way that nobody has foreseen."""
     prepare(tmp_path, plain=4, bad=0, differing=1)
-    read_pair = regress.read_pair
+    read_pair = judge.read_pair
 
     def odd(baseline, candidate, **rules):
         match candidate.stem:
@@ -117,9 +117,9 @@ def test_one_odd_baseline_never_ends_a_night(tmp_path, monkeypatch, capsys):
     def undrawable(*_):
         raise ZeroDivisionError("no extent")
 
-    monkeypatch.setattr(regress, "read_pair", odd)
-    monkeypatch.setattr(regress, "plots", undrawable)
-    monkeypatch.setattr(regress, "write_overlay", undrawable)
+    monkeypatch.setattr(judge, "read_pair", odd)
+    monkeypatch.setattr(judge, "plots", undrawable)
+    monkeypatch.setattr(judge, "write_overlay", undrawable)
     out = tmp_path / "out"
     assert night(tmp_path, out) is ExitCode.INVALID
     assert verdicts_of(out) == {
@@ -137,7 +137,7 @@ def test_one_odd_baseline_never_ends_a_night(tmp_path, monkeypatch, capsys):
     assert f"plain_1: failed: its own recording: {out / 'plain_1' / 'plain_1.mcap'}: damaged" in said
     assert "it cannot be drawn: ZeroDivisionError: no extent; both runs cannot be shown" in said
     assert "Traceback" in (out / "plain_0" / "log.txt").read_text()
-    assert "differ_0" in (out / "index.html").read_text()
+    assert "differ_0" in rows_of(out)
     assert len((out / "history.jsonl").read_text().splitlines()) == 1
 
 
@@ -176,16 +176,16 @@ def test_a_new_baseline_is_told_only_where_one_was_written(tmp_path, capsys):
 
 KILLED = """
 import os, signal, sys
-import replay.batch.regress as regress
+from replay.batch.judge import Judge
 from replay.cli.main import main
-judge = regress._judge
+judged = Judge.judge
 
-def killing(name, *arguments, **options):
-    if name == "c":
+def killing(self, scenario, result):
+    if scenario.name == "c":
         os.kill(os.getpid(), signal.SIGKILL)
-    return judge(name, *arguments, **options)
+    return judged(self, scenario, result)
 
-regress._judge = killing
+Judge.judge = killing
 main(sys.argv[1:])
 """
 

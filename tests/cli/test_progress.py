@@ -1,5 +1,6 @@
 """What is seen on stderr while a run goes on."""
 
+from replay.batch.case import CaseResult, CaseStatus
 from replay.cli.progress import RunProgress
 from replay.numerics.compiling import Compiling
 
@@ -23,3 +24,17 @@ def test_nothing_is_told_where_nothing_is_compiled(capsys):
         progress.plan({"a": 1.0})
         progress.follow("a", 0, 0)
     assert capsys.readouterr().err == ""
+
+
+def test_a_log_has_a_line_every_few_seconds_and_one_for_each_scenario_that_fails(capsys):
+    names = [f"s{k}" for k in range(1000)]
+    with RunProgress() as progress:
+        progress.plan(dict.fromkeys(names, 1.0))
+        for name in names:
+            status = CaseStatus.BROKEN if name in ("s100", "s500") else CaseStatus.PASSED
+            progress.done(CaseResult(name, status, seconds=0.1))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("replay: [1/1000] s0: passed in 0.1 s")
+    assert lines[-1].startswith("replay: [1000/1000] s999: passed in 0.1 s")
+    assert [line.split()[2] for line in lines if "broken" in line] == ["s100:", "s500:"]
+    assert len(lines) < 20

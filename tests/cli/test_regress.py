@@ -12,7 +12,7 @@ from replay.batch.baseline import Baseline
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from tests.batch import scenes
-from tests.cli.nights import check_verdicts, junit_of, night, prepare, verdicts_of
+from tests.cli.nights import check_verdicts, junit_of, night, prepare, rows_of, verdicts_of
 
 
 def check_night(tmp_path, monkeypatch, *, plain, bad, differing):
@@ -43,9 +43,10 @@ def test_a_night_gives_exactly_the_verdicts_of_its_scenarios(tmp_path, monkeypat
     summary = json.loads((out / "run.json").read_text())
     assert summary["verdicts"]["differ_1"]["since"] == json.loads(nights[0])["time"]
     assert summary["host"]
-    page = (out / "index.html").read_text()
-    assert f"since {json.loads(nights[0])['time']}" in page
-    assert page.index("differ_0") < page.index("plain_0")
+    rows = rows_of(out)
+    assert rows["differ_1"]["since"] == json.loads(nights[0])["time"]
+    assert list(rows)[:2] == ["differ_0", "differ_1"]
+    page = (out / rows["differ_0"]["address"]).read_text()
     command = re.search("<pre class=.mono.>(replay regress .*--select differ_0 .*)</pre>", page)[1]
     again = command.split()[1:]
     again[again.index("-o") + 1] = str(tmp_path / "again")
@@ -88,7 +89,8 @@ def test_one_scenario_with_a_mistake_does_not_cost_the_night(tmp_path, capsys):
     assert "unused" not in said
     assert verdicts_of(out) == {"plain_0": "same", "plain_1": "failed", "plain_2": "same"}
     assert junit_of(out) == {"plain_0": "pass", "plain_1": "error", "plain_2": "pass"}
-    assert "rate = &#39;fast&#39;" in (out / "index.html").read_text()
+    assert "rate = &#39;fast&#39;" in (out / "plain_1" / "report.html").read_text()
+    assert "rate = 'fast'" in rows_of(out)["plain_1"]["message"]
     assert run(["accept", str(out), "--baseline", str(tmp_path / "base"), "--yes"]) is ExitCode.INVALID
     assert "plain_1 (failed)" in capsys.readouterr().err
     assert night(tmp_path, out, "--select", "plain_0") is ExitCode.FINE  # not asked for
@@ -140,7 +142,9 @@ def test_a_recording_is_run_and_compared_again_by_the_command_on_the_page(tmp_pa
     old, out = tmp_path / "old" / "a" / "a.mcap", tmp_path / "out"
     options = ["--baseline", str(tmp_path / "base"), "--rrd", "none", "--missing-baseline", "create"]
     assert run(["regress", str(old), *options, "-o", str(out)]) is ExitCode.FINE
-    command = re.search("<pre class=.mono.>(replay regress .*)</pre>", (out / "index.html").read_text())[1].split()
+    command = re.search("<pre class=.mono.>(replay regress .*)</pre>", (out / "a" / "report.html").read_text())[
+        1
+    ].split()
     assert command[:3] == ["replay", "regress", str(old)]
     command[command.index("-o") + 1] = str(tmp_path / "again")
     assert run(command[1:]) is ExitCode.FINE
@@ -163,9 +167,11 @@ def test_names_and_messages_are_shown_and_not_run(tmp_path):
     path = tmp_path / "in" / "x.yaml"
     path.write_text(path.read_text().replace("name: x", "name: '<script>alert(1)<script>'"))
     assert night(tmp_path, tmp_path / "out") is ExitCode.FAILED
+    (row,) = rows_of(tmp_path / "out")
+    assert row == "<script>alert(1)<script>"
     page = (tmp_path / "out" / "index.html").read_text()
-    assert "<script" not in page
-    assert "&lt;script&gt;" in page
+    assert page.count("<script") == 1 and "&lt;script&gt;alert(1)" in page
+    assert "<script" not in (tmp_path / "out" / row / "report.html").read_text()
     assert list(junit_of(tmp_path / "out")) == ["<script>alert(1)<script>"]
 
 
@@ -189,8 +195,9 @@ def test_the_page_of_a_night_finds_its_baselines_wherever_both_are_moved(tmp_pat
     assert night(tmp_path / "first", tmp_path / "first" / "out", "--rrd", "none") is ExitCode.FINE
     (tmp_path / "first").rename(tmp_path / "moved elsewhere")
     out = tmp_path / "moved elsewhere" / "out"
-    page = (out / "index.html").read_text()
-    assert "file:" not in page
-    (address,) = re.findall('href="([^"]*)">baseline<', page)
-    target = urlsplit(urljoin((out / "index.html").as_uri(), address))
+    (row,) = rows_of(out).values()
+    page = Path(unquote(urlsplit(urljoin((out / "index.html").as_uri(), row["address"])).path))
+    assert "file:" not in page.read_text()
+    (address,) = re.findall('href="([^"]*)" target="_top">baseline<', page.read_text())
+    target = urlsplit(urljoin(page.as_uri(), address))
     assert Path(unquote(target.path)).is_file()

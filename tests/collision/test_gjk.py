@@ -40,14 +40,15 @@ def run_boxes(n, seed):
 @numba.njit
 def _boxes(bodies, halves, which, rotations, positions, work):
     hits, wrong, undecided = 0, 0, 0
+    precise = gjk_exact.precise_points()
     for k in range(len(which)):
         i, j = which[k]
         size = 2.0 * (np.abs(positions[k]).max() + halves[i].max() + halves[j].max())
         gap = reference.box_gap(rotations[k], positions[k], halves[i], halves[j])
         work.simplex[4, 0] = 0
-        status = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, 0.0, 0.0, work)
+        status = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, 0.0, 0.0, work, precise)
         work.simplex[4, 0] = 0
-        measured = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, np.inf, 0.0, work)
+        measured = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, np.inf, 0.0, work, precise)
         hits += gap <= 0.0
         undecided += (status == gjk_exact.UNDECIDED) + (measured == gjk_exact.UNDECIDED)
         if abs(gap) > 1e-12 * size:
@@ -92,7 +93,8 @@ def run_hulls(n, seed):
 
 @numba.njit
 def _query(bodies, i, j, rotation, translation, size, work):
-    return gjk_kernel.query(bodies, i, bodies, j, rotation, translation, size, np.inf, 0.0, work)
+    precise = gjk_exact.precise_points()
+    return gjk_kernel.query(bodies, i, bodies, j, rotation, translation, size, np.inf, 0.0, work, precise)
 
 
 def test_random_boxes_agree_with_separating_axes():
@@ -148,7 +150,8 @@ def test_tables_find_what_looking_at_every_vertex_finds():
 @numba.njit
 def _pair(a, b, rotation, translation, size, cutoff, work):
     work.simplex[4, 0] = 0
-    return gjk_kernel.query(a, 0, b, 0, rotation, translation, size, cutoff, 0.0, work)
+    precise = gjk_exact.precise_points()
+    return gjk_kernel.query(a, 0, b, 0, rotation, translation, size, cutoff, 0.0, work, precise)
 
 
 @pytest.mark.soak

@@ -36,6 +36,7 @@ def test_text_is_short_and_says_where_and_how_much():
     lines = text(found).splitlines()
     assert lines == [
         "different: made_up: 1 change of the scene, 6 of 55 signals changed, 1 difference of provenance",
+        "  worst: contact 33.3 ms later: arm/beam | stand/base; 4 more readings",
         "  provenance (does not decide)",
         f"    libraries.numpy: {np.__version__} -> 9.9",
         "  scene",
@@ -52,7 +53,7 @@ def test_text_is_short_and_says_where_and_how_much():
         "    1 frame with NaN in place of a number, or the reverse",
         "  changed: /distance/right/distance",
         "    20 of 100 frames differ; first frame 20 (0.333333333 s)",
-        *lines[16:18],
+        *lines[17:19],
         "  changed: /joint_states/position/lift",
         "    1 of 100 frames differ; first frame 3 (0.05 s)",
         "    worst abs 2.78e-17 m (rel 1.58e-16) at frame 3 (0.05 s): 0.1755560760690452 -> 0.17555607606904522 m",
@@ -60,8 +61,8 @@ def test_text_is_short_and_says_where_and_how_much():
         "    4 of 100 frames differ; first frame 5 (0.083333333 s)",
         lines[-1],
     ]
-    assert lines[16].startswith("    worst abs 0.001 m at frame ")
-    assert lines[17].startswith("    worst rel 0.00174 at frame 39 (0.65 s): 0.57496115588506")
+    assert lines[17].startswith("    worst abs 0.001 m at frame ")
+    assert lines[18].startswith("    worst rel 0.00174 at frame 39 (0.65 s): 0.57496115588506")
 
 
 def test_verbose_text_lists_what_the_rules_accept_and_why():

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import struct
 import zlib
 from typing import Any
+from xml.sax import saxutils
 
 import zstandard
 
@@ -113,6 +115,31 @@ def of_values(value: Any, rng: random.Random) -> Any:
             case _:
                 owner[path[-1]] = rng.choice(STRAY)
     return value
+
+
+def of_xml(data: bytes, rng: random.Random) -> bytes:
+    """Return XML of which elements or attributes are removed, doubled, moved or replaced, or damaged as a text."""
+    if rng.random() < 0.2:
+        return of_text(data, rng)
+    parts = re.split(rb"(<[^>]*>)", data)
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        at, other = rng.randrange(len(parts)), rng.randrange(len(parts))
+        values = [*re.finditer(rb'"[^"]*"', parts[at])]
+        match rng.randrange(6):
+            case 0:
+                parts[at] = b""
+            case 1:
+                parts[at : at + 1] = [parts[at]] * rng.choice((2, 5, 200))
+            case 2:
+                parts[at], parts[other] = parts[other], parts[at]
+            case _ if values:
+                one = rng.choice(values)
+                word = str(rng.choice((*WORDS, *STRAY, "a.stl", "b.dae", "base", "turn", "1 2 3", "1e-320 1 1")))
+                value = saxutils.quoteattr(word).encode(errors="replace")
+                parts[at] = parts[at][: one.start()] + value + parts[at][one.end() :]
+            case _:
+                parts[at] = of_text(parts[at], rng)
+    return b"".join(parts)
 
 
 def of_json(data: bytes, rng: random.Random) -> bytes:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import datetime
 import io
 import json
 import random
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
-import numpy as np
 import pyarrow
 import pyarrow.parquet
 import trimesh
@@ -22,7 +20,6 @@ from replay.batch.case import CaseResult
 from replay.batch.history import failing_since, read_history
 from replay.batch.written import read_result
 from replay.cli.exit_codes import ExitCode
-from replay.cli.main import run
 from replay.comparison.rules_file import read_rules
 from replay.errors import ReplayError
 from replay.geometry.mesh import load_mesh
@@ -31,8 +28,11 @@ from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.reader import read
 from replay.recording.record import RecordedPaths
-from replay.scenario.load import load_cases, load_sources
+from replay.scenario.load import load_cases, load_model, load_sources
 from tests.fuzz import damage
+from tests.fuzz.door import Door, command
+from tests.fuzz.robot_doors import robot_doors
+from tests.fuzz.run_doors import RunDoors
 from tests.logs import made_logs
 from tests.recording.test_round_trip import write
 
@@ -59,6 +59,12 @@ SWEEP = SCENARIO.replace(b"tags: [a, b]\n", b"") + (
     b"sweep:\n  grid:\n    sensors.distance.tip.aperture: [10 deg, 20 deg]\n"
     b'    "motion.moves[0].to.arm": [1 deg, 2 deg]\n'
 )
+PART = SCENARIO.partition(b"links:")[2]
+INCLUDING = SCENARIO.partition(b"links:")[0] + b"include: [part.yaml]\n"
+MODEL = b"""collision: {bounds: obb, narrowphase: gjk, pieces: exact, clearance: near, between: proven}
+distance: {method: rays, count: 100}
+capacitive: {method: tree, rtol: 1e-6}
+"""
 LISTED = SWEEP.partition(b"sweep:")[0] + b"sweep:\n  list:\n    - {rate: 10 Hz}\n    - {rate: 20 Hz, duration: 2 s}\n"
 RULES = b"""rules_version: 1
 rules:
@@ -82,30 +88,6 @@ RUN = {
     "planned": 1,
     "scenarios": {"made_up": {"status": "passed", "seconds": 0.1, "memory": 1}},
 }
-
-
-@dataclass(frozen=True)
-class Door:
-    """A way in.
-
-    Attributes:
-        weight: share of the executions.
-        make: damaged input, by file name.
-        enter: brings it in from a folder; raises ReplayError where it is refused.
-    """
-
-    weight: int
-    make: Callable[[random.Random], dict[str, bytes]]
-    enter: Callable[[Path], object]
-
-
-def command(*arguments: str) -> ExitCode:
-    """Run the command line; AssertionError for a traceback."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = run(arguments)
-    assert "fault of replay" not in err.getvalue(), err.getvalue()[-2000:]
-    return code
 
 
 class House:
@@ -148,6 +130,12 @@ class House:
                 lambda f: load_cases(f / "sweep.yaml"),
             ),
             "validate": Door(2, self._text("s.yaml", SCENARIO), lambda f: command("validate", str(f / "s.yaml"))),
+            "include": Door(
+                6,
+                lambda rng: {"main.yaml": INCLUDING, "part.yaml": d.of_text(b"links:" + PART, rng)},
+                lambda f: load_cases(f / "main.yaml"),
+            ),
+            "model": Door(15, self._text("model.yaml", MODEL), lambda f: load_model(f / "model.yaml")),
             "rules": Door(15, self._text("rules.yaml", RULES), self._enter_rules),
             "csv": Door(50, lambda rng: {"log.csv": d.of_text(self._csv, rng)}, self._motion("log.csv")),
             "curve": Door(40, self._text("curve.csv", b"distance_cm,output_V\n1,2.0\n2,2.1\n3,2.2\n"), self._curve),
@@ -189,6 +177,8 @@ class House:
                 lambda rng: {"run.json": json.dumps(RUN).encode(), "accepted.jsonl": d.of_json(b'{"time": "x"}', rng)},
                 self._accept,
             ),
+            **robot_doors(),
+            **RunDoors(self.folder, SCENARIO).doors(),
         }
 
     def _text(self, name: str, whole: bytes) -> Callable[[random.Random], dict[str, bytes]]:
@@ -268,6 +258,9 @@ class House:
             *("--html", str(folder / "d.html"), "--junit", str(folder / "d.xml")),
         )
         assert code in (ExitCode.FINE, ExitCode.DIFFERENT, ExitCode.INVALID)
+        if code is not ExitCode.INVALID:
+            ElementTree.parse(folder / "d.xml")
+            (folder / "d.html").read_text()
         return code
 
     def _make_metadata(self, rng: random.Random) -> dict[str, bytes]:
@@ -308,19 +301,3 @@ TEXT_PLY = (
     b"property list int int vertex_indices\nend_header\n"
     b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n4 0 3 2 1\n3 0 1 4\n5 0 1 2 3 4\n5 0 1 2 -1 4\n"
 )
-
-
-def knock(door: Door, folder: Path, files: dict[str, bytes]) -> str:
-    """Bring files in by a door; return what became of them: "read", or "refused" in one line each."""
-    for name, data in files.items():
-        file = folder / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(data)
-    try:
-        with np.errstate(all="ignore"):
-            door.enter(folder)
-    except ReplayError as error:
-        assert str(error).strip(), "an error without a word"
-        assert all(len(line) < 2000 for line in str(error).splitlines()), "an error of endless words"
-        return "refused"
-    return "read"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import resource
 import signal
@@ -23,17 +24,15 @@ STILL = 300.0
 """Longest time [s] of one input that waits for something."""
 MOST = 2 << 30
 """Most resident memory [bytes] of the process."""
-_OWN = (
-    tempfile.gettempdir(),
-    "/dev/null",
-    "/proc/self",
-    "/sys/",
-    "/usr/share",
-    "/etc/",
-    *map(str, (Path(replay.__file__).parents[1], *site.getsitepackages())),
-    *sysconfig.get_paths().values(),
-    sys.prefix,
-    sys.base_prefix,
+_OWN = tuple(
+    os.path.realpath(place) + "/"
+    for place in (
+        tempfile.gettempdir(),
+        *("/dev/null", "/proc/self", "/sys", "/usr/share", "/etc/mime.types"),
+        *(Path(replay.__file__).parents[1], *site.getsitepackages()),
+        *sysconfig.get_paths().values(),
+        *(sys.prefix, sys.base_prefix),
+    )
 )
 """Where files may be opened: what a test writes, and what Python and its libraries load."""
 _PROCESSES = re.compile(r"subprocess\.|os\.(system|exec|spawn|posix_spawn|fork|startfile)|pty\.|socket\.(?!__new__)")
@@ -45,9 +44,9 @@ _watching: list[bool] = []
 def _hook(event: str, arguments: tuple[object, ...]) -> None:
     if not _watching:
         return
-    if event == "open" and isinstance(arguments[0], str | bytes):
-        path = arguments[0].decode(errors="replace") if isinstance(arguments[0], bytes) else arguments[0]
-        if path.startswith("/") and not path.startswith(_OWN):
+    if event == "open" and isinstance(arguments[0], str | bytes | os.PathLike):
+        path = os.path.realpath(os.fsdecode(arguments[0]))
+        if not f"{path}/".startswith(_OWN):
             _foreign.append(f"open {path}")
     elif _PROCESSES.match(event):
         _foreign.append(event)

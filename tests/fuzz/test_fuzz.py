@@ -10,16 +10,18 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import guard
-from tests.fuzz.doors import House, knock
+from tests.fuzz.door import knock
+from tests.fuzz.doors import House
 from tests.fuzz.run import CORPUS
 
+ROOT = Path(__file__).parents[2]
 KEPT = sorted(path.parent for path in CORPUS.rglob("DOOR"))
 
 
 def executions(count: int, seed: int) -> str:
     """Run inputs in a process of its own, whose hook and peak of memory concern nothing else."""
     command = [sys.executable, "-m", "tests.fuzz.run", str(count), str(seed)]
-    done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
     return done.stdout
 
@@ -33,6 +35,16 @@ def test_a_sample_of_damage_at_every_door() -> None:
 @pytest.mark.soak
 def test_a_million_inputs() -> None:
     assert " 0 kinds broken" in executions(int(os.environ.get("SOAK", "1000000")), seed=2)
+
+
+@pytest.mark.parametrize("way", ["/etc/hostname", "in/../{up}etc/hostname", "link"])
+def test_a_foreign_file_is_noticed_whichever_way_it_is_named(way: str, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "link").symlink_to("/etc/hostname")
+    file = tmp_path / way.format(up="../" * 20)
+    code = f"from tests.fuzz import guard\nguard.install()\nwith guard.watched():\n    open({str(file)!r})\n"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "AssertionError: opened: ['open /etc/hostname']" in done.stderr
 
 
 @pytest.fixture(scope="module")

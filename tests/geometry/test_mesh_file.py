@@ -330,3 +330,11 @@ def test_a_scene_of_several_parts_is_put_together():
         scene.add_geometry(BOX, transform=trimesh.transformations.translation_matrix([x, 0, 0]))
     vertices, faces = read_faces("two.glb", scene.export(file_type="glb"))
     assert len(faces) == 24 and np.ptp(vertices[:, 0]) == pytest.approx(4.0)
+
+
+def test_of_a_file_that_is_too_large_nothing_is_read(tmp_path):
+    file = tmp_path / "huge.stl"
+    with file.open("wb") as stream:
+        stream.truncate(1 << 40)
+    with pytest.raises(MeshError, match="has 1099511627776 bytes; at most 1073741824 are read"):
+        read_faces(file)

@@ -117,3 +117,13 @@ def test_what_readers_would_refuse_is_not_written() -> None:
 
     with pytest.raises(InvalidValue, match=r"size of a\.bin"):
         McapFileWriter(io.BytesIO(), "test").attachment("a.bin", "", Endless())
+
+
+@pytest.mark.parametrize(
+    ("times", "numbers", "data"), [([1, 2], [1], [b"a", b"b"]), ([1], [1, 2], [b"a"]), ([1], [1], [b"a", b"b"])]
+)
+def test_no_message_is_lost_where_times_numbers_and_data_do_not_match(times, numbers, data) -> None:
+    writer = McapFileWriter(io.BytesIO(), "test")
+    channel = writer.channel("/a", writer.schema(Schema("a", "protobuf", b"")))
+    with pytest.raises(ValueError):
+        writer.messages(channel, times, numbers, data)

@@ -120,3 +120,19 @@ def test_a_text_may_end_where_its_message_does_and_no_byte_later():
     assert decode_ros1(types, "a/msg/A", ros1) == {"f": "abc"}
     with pytest.raises(ValueError, match="a text claims 3 bytes, more than it holds"):
         decode_ros1(types, "a/msg/A", ros1[:-1])
+
+
+HEADER = f"{made_logs.LINE}MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\nstring more\n"
+
+
+@pytest.mark.parametrize("ros1", [False, True])
+def test_types_that_a_definition_leaves_out_are_ross_and_its_own_stay_its_own(ros1):
+    left_out = types_of("a/msg/A", "std_msgs/Header header\ngeometry_msgs/Point at\n", ros1=ros1)
+    assert [field.name for field in left_out["a/msg/A"]] == ["header", "at"]
+    assert [field.name for field in left_out["geometry_msgs/msg/Point"]] == ["x", "y", "z"]
+    assert [field.name for field in left_out["std_msgs/msg/Header"]] == ["seq"] * ros1 + ["stamp", "frame_id"]
+    own = types_of("a/msg/A", f"std_msgs/Header header\ngeometry_msgs/Point at\n{HEADER}", ros1=ros1)
+    assert [field.name for field in own["std_msgs/msg/Header"]] == ["stamp", "frame_id", "more"]
+    assert "geometry_msgs/msg/Point" in own
+    whole = types_of("a/msg/A", f"std_msgs/Header header\n{HEADER}", ros1=ros1)
+    assert "geometry_msgs/msg/Point" not in whole

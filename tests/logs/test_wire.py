@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf import FrameTransform_pb2, JointStates_pb2, LaserScan_pb2, Log_pb2
+from google.protobuf import descriptor_pb2
 from google.protobuf.descriptor import FieldDescriptor
 from hypothesis import given
 from hypothesis import strategies as st
 
 from replay.errors import InvalidValue
+from replay.logs.protobuf import message_type
 from replay.logs.wire import MessageShape, Slot, shape_of
 
 
@@ -132,3 +134,92 @@ def test_varints_written_longer_than_needed_are_read(is_array: bool) -> None:
             again = np.full((4, 4), 9, dtype=np.uint8)
             slot.write(again, found)
             assert again.tolist() == rows.tolist()
+
+
+LIST_KINDS = {
+    "uint32": FieldDescriptor.TYPE_UINT32,
+    "sint64": FieldDescriptor.TYPE_SINT64,
+    "bool": FieldDescriptor.TYPE_BOOL,
+    "fixed32": FieldDescriptor.TYPE_FIXED32,
+    "double": FieldDescriptor.TYPE_DOUBLE,
+    "uint64": FieldDescriptor.TYPE_UINT64,
+}
+
+
+def message_of_lists():
+    """A message type with a packed list of each of these types."""
+    file = descriptor_pb2.FileDescriptorProto(name="lists.proto", syntax="proto3")
+    lists = file.message_type.add(name="Lists")
+    for number, (name, kind) in enumerate(LIST_KINDS.items(), 1):
+        lists.field.add(name=name, number=number, label=3, type=kind)
+    return message_type("a", "Lists", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("uint32", [1, 127, 3]),
+        ("uint32", [128, 16383]),
+        ("sint64", [-64, 63, 0]),
+        ("sint64", [-(2**63), 2**63 - 1]),
+        ("uint64", [2**64 - 1, 2**63]),  # varints of ten bytes, the longest there are
+        ("bool", [True, False, True]),
+        ("fixed32", [0, 2**32 - 1]),
+        ("double", [0.0, -1.5]),
+    ],
+)
+def test_lists_whose_values_take_equal_space_are_one_column(name, values) -> None:
+    lists = message_of_lists()
+    data = lists(**{name: values}).SerializeToString()
+    shape = shape_of(lists.DESCRIPTOR, data)
+    assert shape is not None and [*shape.slots] == [name] and shape.slots[name].is_array
+    assert shape.slots[name].read(np.frombuffer(data, dtype=np.uint8)[None]).tolist() == [values]
+
+
+@pytest.mark.parametrize("values", [[1, 300], [300, 1], [1, 1, 2**20], [2**20, 1, 1], [300, 300, 1, 300]])
+def test_a_list_of_varints_of_different_widths_is_no_column(values) -> None:
+    lists = message_of_lists()
+    assert shape_of(lists.DESCRIPTOR, lists(uint32=values).SerializeToString()) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x0a\x00",  # an empty list
+        b"\x0a\x02\x80\x80",  # one that ends within a varint
+        b"\x0a\x0b" + b"\x80" * 10 + b"\x01",  # a varint of eleven bytes
+        b"\x22\x03abc",  # three bytes of four
+        b"\x22\x04abcd\x22\x04abcd",  # in two pieces
+    ],
+)
+def test_a_list_that_is_not_as_it_should_be_is_no_column(data) -> None:
+    assert shape_of(message_of_lists().DESCRIPTOR, data) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x0d\0\0\0\0",  # a uint32 as four bytes
+        b"\x09" + bytes(8),  # as eight
+        b"\x20\x01",  # a fixed32 as a varint
+        b"\x21" + bytes(8),  # as eight bytes
+        b"\x25\0\0\0",  # cut short
+        b"\x2d\0\0\0\0",  # a double as four bytes
+        b"\x0b",  # a group
+    ],
+)
+def test_a_value_of_another_wire_type_than_its_field_has_is_no_slot(data) -> None:
+    assert shape_of(message_of_lists().DESCRIPTOR, data) is None
+
+
+@pytest.mark.parametrize(("name", "value"), [("uint32", 5), ("fixed32", 7), ("double", -0.5), ("sint64", -3)])
+def test_a_list_of_one_that_is_not_packed_is_a_slot(name, value) -> None:
+    number = [*LIST_KINDS].index(name) + 1
+    lists = message_of_lists()
+    packed = lists(**{name: [value]}).SerializeToString()[2:]
+    wire = {"fixed32": 5, "double": 1}.get(name, 0)
+    data = bytes([number << 3 | wire]) + packed
+    assert lists.FromString(data) == lists(**{name: [value]})
+    shape = shape_of(lists.DESCRIPTOR, data)
+    assert shape is not None and [*shape.slots] == [f"{name}[0]"]
+    assert shape.slots[f"{name}[0]"].read(np.frombuffer(data, dtype=np.uint8)[None]).tolist() == [value]

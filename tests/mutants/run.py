@@ -178,7 +178,7 @@ def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     targets = Targets(tree.root)
     experience = Experience(tree, targets, work / "experience.json")
     results = _results(work / "results.jsonl", again=options.again)
-    todo = [mutation for mutation in mutations if mutation.id not in results]
+    todo = sorted((m for m in mutations if m.id not in results), key=lambda m: m.id)  # so that rooms take turns
     _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
     for number, mutation in enumerate(todo, 1):
         outcome, how = try_mutation(mutation, tree, targets, experience, options)

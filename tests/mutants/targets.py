@@ -20,7 +20,7 @@ class Targets:
         modules = {_module(path.relative_to(root)): str(path.relative_to(root)) for path in files}
         self._imported_by: dict[str, set[str]] = {}
         for path in files:
-            for name in _imports(path):
+            for name in _imports(path, ".".join(path.relative_to(root).parent.parts)):
                 if name in modules:
                     self._imported_by.setdefault(modules[name], set()).add(str(path.relative_to(root)))
 
@@ -64,11 +64,14 @@ def _module(path: Path) -> str:
     return name.removesuffix(".__init__")
 
 
-def _imports(path: Path) -> set[str]:
+def _imports(path: Path, package: str) -> set[str]:
+    """Return the modules that one names: also by a text, as those are imported by that are imported when first used."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
+            found |= {f"{package}.{node.value}", f"{package}.{node.value}_"}
     return found

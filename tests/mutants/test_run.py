@@ -99,12 +99,15 @@ def test_the_nearest_and_quickest_tests_are_asked_and_those_of_everything_last(t
         "tests/room/test_shared.py": "from tests.room.shared import x\n",
         "tests/test_wheel.py": "import replay.room.thing\n",
         "tests/room/test_other.py": "import json\n",
+        "replay/room/__init__.py": "__getattr__ = submodules(x='lazy')",
+        "replay/room/lazy.py": "",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     seconds = {f"tests/room/test_{name}.py": 1.0 for name in ("thing", "quick", "user", "shared", "other")}
     seconds |= {"tests/room/test_slow.py": 5.0, "tests/test_wheel.py": 0.1}
+    assert "tests/room/test_slow.py" in Targets(tmp_path).of("replay/room/lazy.py", seconds, 100.0)
     every = Targets(tmp_path).of("replay/room/thing.py", seconds, 100.0)
     near = [Path(name).stem.removeprefix("test_") for name in every]
     assert near == ["thing", "quick", "slow", "shared", "user", "wheel"]

@@ -159,6 +159,8 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
         os.dup2(descriptor, 2)
         os.chdir(root)
         os.environ.update(PYTHONPATH=str(root), NUMBA_CACHE_DIR=str(cache), TMPDIR=str(temporary), OMP_NUM_THREADS="1")
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # of many trials hardly a module differs
+        sys.dont_write_bytecode = False
         if not compiled:
             os.environ["NUMBA_DISABLE_JIT"] = "1"
             importlib.import_module("numba").core.config.reload_config()

@@ -35,7 +35,7 @@ def rerun(*arguments: str) -> str:
 def test_its_check_finds_nothing_wrong(path: Path) -> None:
     lines = rerun("mcap", "check", "--full", str(path)).splitlines()
     topics = [line.split() for line in lines if "/" in line and line.startswith(("ok", "warn", "err", "fail"))]
-    assert len(topics) == 7
+    assert len(topics) == 8
     assert all(words[0] == "ok" for words in topics)
 
 

@@ -137,7 +137,11 @@ def test_the_plain_reader_and_the_foxglove_schemas_read_it(path: Path, seeking: 
                 mesh = decoded.entities[0].triangles[0]
                 corners = np.array([[p.x, p.y, p.z] for p in mesh.points])[list(mesh.indices)].reshape(-1, 3, 3)
                 assert np.array_equal(corners, synthetic.scene().bodies[0].triangles)
-        assert {topic: n for topic, n in counts.items() if topic not in ("/events", "/scene")} == dict.fromkeys(
+            elif topic == "/layout":
+                assert list(decoded.pairs) == list(synthetic.LAYOUT.pairs)
+                assert list(decoded.sensors) == list(synthetic.LAYOUT.topics())
+        once = ("/events", "/scene", "/layout")
+        assert {topic: n for topic, n in counts.items() if topic not in once} == dict.fromkeys(
             ["/tf", "/collision", "/joint_states", "/capacitive/guard", "/distance/left", "/distance/right ä"], FRAMES
         )
         if seeking:

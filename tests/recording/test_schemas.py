@@ -14,7 +14,7 @@ from replay.recording import messages
 from replay.sensing.kinds import KINDS
 
 SCHEMAS = Path(replay.__file__).parents[1] / "schemas"
-OWN = [messages.COLLISION, messages.GUARDS, *(kind.message for kind in KINDS.values())]
+OWN = [messages.COLLISION, messages.GUARDS, messages.LAYOUT, *(kind.message for kind in KINDS.values())]
 
 
 def made(name: str) -> FileDescriptorSet:
@@ -47,6 +47,7 @@ def test_field_numbers_stay_for_ever() -> None:
             "clearance_bound": 6,
         },
         "GuardStates": {"state": 1, "condition": 2, "factor": 3, "rate": 4, "script_time": 5},
+        "Layout": {"links": 1, "joints": 2, "pairs": 3, "shapes": 4, "objects": 5, "sensors": 6},
         "DistanceReading": {
             "status": 1,
             "distance": 2,

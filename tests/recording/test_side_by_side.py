@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from replay.errors import ViewerError
 from replay.recording.rerun_log import RerunWriter
-from replay.recording.side_by_side import one_recording, side_names
+from replay.recording.side_by_side import _Contents, one_recording, side_names
 from tests.recording import moving
 
 
@@ -50,6 +51,23 @@ def test_everything_of_both_is_there(tmp_path: Path) -> None:
     assert not both.exists()
     with one_recording(files[:1]) as one:
         assert one == files[0]
+
+
+def eyes(path: Path) -> np.ndarray:
+    """Return position and target (views, 2, 3) [m] of the eyes of a recording's views."""
+    found = _Contents()
+    found.look_from(RrdReader(str(path)))
+    return np.array(found.eyes)
+
+
+def test_both_are_seen_as_each_is_seen_alone(tmp_path: Path) -> None:
+    files = [write(tmp_path / name / "moving.rrd", 10) for name in ("old", "new")]
+    alone = eyes(files[0])
+    assert alone.shape == (1, 2, 3) and np.isfinite(alone).all()
+    with one_recording(files) as both:
+        views = eyes(both)
+    assert len(views) == 2
+    np.testing.assert_allclose(views, np.repeat(alone, 2, axis=0), rtol=0, atol=1e-5 * np.abs(alone).max())
 
 
 def test_sides_are_named_by_what_tells_them_apart() -> None:

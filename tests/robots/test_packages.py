@@ -1,5 +1,7 @@
 """Where the files of a description are looked for, and what the part calls them."""
 
+from pathlib import Path
+
 import pytest
 
 from replay.errors import RobotError
@@ -70,6 +72,41 @@ def test_what_is_not_found_says_where_it_was_looked_for(tmp_path):
     for wrong in ("robot", "robot=", "=x", f"robot={tmp_path}/nowhere"):
         with pytest.raises(RobotError, match="--package"):
             run(tmp_path / "r.urdf", tmp_path / "p.yaml", Options(packages=[wrong]))
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["a" * 300 + ".stl", f"package://{'a' * 300}/a.stl", f"package://robot/{'a' * 300}.stl", "a/" * 3000 + "a.stl"],
+)
+def test_names_that_no_file_can_have_are_refused(written, tmp_path):
+    (tmp_path / "robot").mkdir()
+    with pytest.raises(RobotError, match=r"r\.urdf:7: 'a?.* cannot be looked for: File name too long") as caught:
+        found(tmp_path / "robot", written)
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize("written", ["circle.stl", "circle.stl/a.stl", "package://robot/circle.stl"])
+def test_links_that_go_in_a_circle_are_no_mesh(written, tmp_path):
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "circle.stl").symlink_to("circle.stl")
+    with pytest.raises(RobotError, match="is not to be found"):
+        found(tmp_path / "robot", written)
+
+
+def test_a_mesh_that_may_not_be_read_is_one_line(tmp_path, monkeypatch):
+    put(tmp_path / "a.stl")
+    (tmp_path / "r.urdf").write_text(made.robot(made.link("a", '<mesh filename="a.stl"/>')))
+
+    whole = Path.open
+
+    def refused(path, *mode):
+        if path.suffix == ".stl":
+            raise PermissionError(13, "Permission denied", str(path))
+        return whole(path, *mode)
+
+    monkeypatch.setattr("pathlib.Path.open", refused)
+    with pytest.raises(RobotError, match=r"'a\.stl' cannot be read: Permission denied"):
+        run(tmp_path / "r.urdf", tmp_path / "p.yaml", Options())
 
 
 def test_meshes_are_named_in_place_or_copied(tmp_path):

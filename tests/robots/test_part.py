@@ -9,8 +9,10 @@ from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run as command
 from replay.errors import RecordingExistsError, RobotError
 from replay.robots.importing import Options, run
+from replay.robots.part import _chord
 from replay.scenario.load import load
 from replay.scenario.scene import build
+from replay.scenario.shapes import SpherePart
 from tests.robots import made
 
 STL = (
@@ -232,3 +234,13 @@ def test_the_command_says_what_was_lost_and_leaves_with_3(tmp_path, capsys):
     assert report["lossy"] and report["links"] == 1
     assert report["changes"][0]["place"] == "link a" and report["changes"][0]["physical"]
     assert "#   link a: shows a body" in (tmp_path / "p.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("radius", "chord"),
+    [(1e-3, 2e-5), (0.0499, 9.98e-4), (0.05, None), (1.0, None), (100.0, None), (100.1, 0.01), (1e4, 1.0)],
+)
+def test_round_bodies_of_any_size_are_as_fine_as_the_language_takes_them(radius, chord):
+    told = _chord(radius)
+    assert told == ({} if chord is None else {"chord_error": pytest.approx(chord, rel=6e-3)})
+    assert SpherePart.model_validate({"type": "sphere", "radius": radius, **told}).chord_error <= 0.03 * radius

@@ -108,16 +108,16 @@ def within(begin: float, end: float) -> str:
     ("expectation", "contact", "rows", "undecided", "passed", "detail"),
     [
         (NEVER, [], [], [], True, "contact in 0 of 11 frames"),
-        (NEVER, [], TUNNEL, [], False, "contact between frames 4 and 5, first at 0.46 s, until 0.49 s"),
-        (NEVER, [], AGAIN, [], False, "contact between frames 4 and 5 and once more, first at 0.46 s, until 0.49 s"),
-        (NEVER, [(5, 0), (6, 0), (7, 0)], SEEN, [], False, "contact in 3 of 11 frames, first at 0.46 s"),
+        (NEVER, [], TUNNEL, [], False, "contact between frames 4 and 5, @ first at 0.46 s, until 0.49 s"),
+        (NEVER, [], AGAIN, [], False, "contact between frames 4 and 5 and once more, @ first at 0.46 s, until 0.49 s"),
+        (NEVER, [(5, 0), (6, 0), (7, 0)], SEEN, [], False, "contact in 3 of 11 frames, @ first at 0.46 s"),
         (
             NEVER,
             [(9, 1)],
             TUNNEL,
             [],
             False,
-            "contact in 1 of 11 frames and between frames 4 and 5, first at 0.46 s, until 0.49 s",
+            "contact in 1 of 11 frames and between frames 4 and 5, @ first at 0.46 s, until 0.49 s",
         ),
         (NEVER, [], [], [(5, 1)], False, "contact in 0 of 11 frames, not proven between frames 4 and 5"),
         (
@@ -129,19 +129,19 @@ def within(begin: float, end: float) -> str:
             "contact in 0 of 11 frames, not proven between frames 4 and 5 and once more",
         ),
         ("{pair: [cube, post], contact: never}", [], TUNNEL, [(3, 0)], True, "contact in 0 of 11 frames"),
-        (SOMETIMES, [], TUNNEL, [], True, "contact between frames 4 and 5, first at 0.46 s, until 0.49 s"),
+        (SOMETIMES, [], TUNNEL, [], True, "contact between frames 4 and 5, @ first at 0.46 s, until 0.49 s"),
         (SOMETIMES, [], [], [(5, 1)], False, "contact in 0 of 11 frames"),
-        (within(0.46, 0.5), [], TUNNEL, [], True, "contact begins at 0.46 s"),
-        (within(0.45, 0.46), [], TUNNEL, [], True, "contact begins at 0.46 s"),
-        (within(0.47, 0.5), [(5, 0)], SEEN, [], False, "contact begins at 0.46 s"),
-        (within(0.46, 0.5), [], TUNNEL, [(8, 1)], True, "contact begins at 0.46 s"),
+        (within(0.46, 0.5), [], TUNNEL, [], True, "contact of @ begins at 0.46 s"),
+        (within(0.45, 0.46), [], TUNNEL, [], True, "contact of @ begins at 0.46 s"),
+        (within(0.47, 0.5), [(5, 0)], SEEN, [], False, "contact of @ begins at 0.46 s"),
+        (within(0.46, 0.5), [], TUNNEL, [(8, 1)], True, "contact of @ begins at 0.46 s"),
         (
             within(0.46, 0.5),
             [],
             TUNNEL,
             [(2, 1)],
             False,
-            "contact begins at 0.46 s, not proven between frames 1 and 2",
+            "contact of @ begins at 0.46 s, not proven between frames 1 and 2",
         ),
         (within(0, 1), [], [], [(2, 1)], False, "contact in no frame, not proven between frames 1 and 2"),
         (ALWAYS, [(k, 0) for k in range(FRAMES)], [], [], True, "contact in 11 of 11 frames"),
@@ -154,7 +154,7 @@ def within(begin: float, end: float) -> str:
             [(0, 1, True, 0.46), (0, 1, False, 0.47)],
             [],
             False,
-            "bounds meet between frames 4 and 5, first at 0.46 s, until 0.47 s",
+            "bounds meet between frames 4 and 5, @ first at 0.46 s, until 0.47 s",
         ),
         (
             CLEARANCE,
@@ -162,7 +162,7 @@ def within(begin: float, end: float) -> str:
             [],
             [],
             True,
-            "smallest clearance 0.25 m at 0 s, proven at least 0.125 m between frames",
+            "smallest clearance 0.25 m of @ at 0 s, proven at least 0.125 m between frames",
         ),
         (
             CLEARANCE,
@@ -170,15 +170,16 @@ def within(begin: float, end: float) -> str:
             TUNNEL,
             [],
             False,
-            "smallest clearance 0.25 m at 0 s; 0 m between frames 4 and 5, first at 0.46 s",
+            "smallest clearance 0.25 m of @ at 0 s; 0 m between frames 4 and 5, @ first at 0.46 s",
         ),
-        (CLEARANCE, [], [], [(3, 1)], False, "smallest clearance 0.25 m at 0 s, not proven between frames 2 and 3"),
-        (CLEARANCE, [(5, 0)], SEEN[:1], [], False, "smallest clearance 0 m at 0.5 s"),
+        (CLEARANCE, [], [], [(3, 1)], False,
+ "smallest clearance 0.25 m of @ at 0 s, not proven between frames 2 and 3"),
+        (CLEARANCE, [(5, 0)], SEEN[:1], [], False, "smallest clearance 0 m of @ at 0.5 s"),
     ],
 )  # fmt: skip
 def test_what_lies_between_frames_counts(size, expectation, contact, rows, undecided, passed, detail):
     outcome = judged(expectation, blocks(contact, rows, undecided, size))
-    assert (outcome.passed, outcome.detail) == (passed, detail)
+    assert (outcome.passed, outcome.detail) == (passed, detail.replace("@", "cube/a | plate/b"))
 
 
 def judged(expectation, found):
@@ -194,7 +195,7 @@ def test_frames_alone_prove_nothing_and_judge_as_before():
     outcome = judged(NEVER, blocks([], TUNNEL, [], 4, looked=False))
     assert (outcome.passed, outcome.detail) == (True, "contact in 0 of 11 frames")
     outcome = judged(CLEARANCE, blocks([], TUNNEL, [], 4, looked=False))
-    assert (outcome.passed, outcome.detail) == (True, "smallest clearance 0.25 m at 0 s")
+    assert (outcome.passed, outcome.detail) == (True, "smallest clearance 0.25 m of cube/a | plate/b at 0 s")
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,20 @@ def test_what_is_not_there_says_what_works(tmp_path, body_package, file, reason)
     assert str(caught.value) == f"{tmp_path}/main.yaml:5:44: links.x.shapes.m.file = {file!r} {reason}"
 
 
+def test_names_that_no_file_can_have_are_refused(tmp_path, body_package):
+    (tmp_path / "circle.stl").symlink_to("circle.stl")
+    (tmp_path / "site" / body_package / "circle.stl").symlink_to("circle.stl")
+    for file, reason in (
+        ("a" * 300 + ".stl", "cannot be read: File name too long"),
+        (f"package://{body_package}/{'a' * 300}.stl", "cannot be read: File name too long"),
+        ("circle.stl", "cannot be read: Too many levels of symbolic links"),
+        ("circle.stl/x.stl", "cannot be read: Too many levels of symbolic links"),
+        (f"package://{body_package}/circle.stl", "does not exist in the package"),
+    ):
+        with pytest.raises(ScenarioError, match=f"main.yaml:5:44: .*{reason}"):
+            load_mesh_of(tmp_path, file)
+
+
 def test_the_phantoms_say_how_to_get_them(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(ScenarioError, match="get it with: pip install --no-deps pyskindose"):

@@ -4,9 +4,11 @@ import json
 import pickle
 
 import pytest
+from pydantic import ValidationError
 
 from replay.errors import ScenarioError
 from replay.scenario.load import load, load_cases, load_sources
+from replay.scenario.sweep import SweepPart
 
 TEXT = """version: 1
 name: eye
@@ -130,3 +132,17 @@ def test_cases_share_their_meshes_in_memory(tmp_path):
     path.write_text(path.read_text().replace("{type: cube, size: 0.1}", "{type: mesh, file: ball.stl, scale: 1}"))
     found = load_cases(path)
     assert len({id(scenario.sources["ball.stl"]) for scenario in found}) == 1
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ((101, 100), "makes 10100 cases; at most 10000 are run"),
+        ((1000, 1000, 1000), "makes 1000000000 cases; at most"),
+        ((1001, 1000, 1000), r"makes more than 10\^9 cases; at most"),
+    ],
+)
+def test_so_many_cases_are_told_and_no_number_longer_than_that(counts, told):
+    with pytest.raises(ValidationError, match=told):
+        SweepPart.model_validate({"grid": {f"a.b{k}": [1] * count for k, count in enumerate(counts)}})
+    SweepPart.model_validate({"grid": {"a.b": [1] * 100, "a.c": [1] * 100}})

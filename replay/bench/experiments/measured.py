@@ -11,11 +11,9 @@ from replay.logs.curve_csv import Column, Curve, read_curve
 from replay.scenario.calibration import SensorPath
 from replay.scenario.load import load
 from replay.sensing.calibration import Quantity
+from replay.sensing.capacitive.part import SUPPLY
 
 PICOFARAD = float(CAPACITANCE.units["pF"])
-SUPPLY = 2.5
-"""V_in [V] of the plates in scenarios/experiments."""
-
 COUPLING = 10.0
 """C_couple [pF] of the plates in scenarios/experiments, which a delta output needs."""
 

@@ -7,7 +7,7 @@ user is told.
 
 from __future__ import annotations
 
-from replay.numerics.jit.entries import compile_entries, entries_of, entry, record
+from replay.numerics.jit.entries import compile_entries, entries_of, entry, rare_entry, record
 from replay.numerics.jit.policy import inlined_kernel, kernel, leaf_kernel
 
-__all__ = ["compile_entries", "entries_of", "entry", "inlined_kernel", "kernel", "leaf_kernel", "record"]
+__all__ = ["compile_entries", "entries_of", "entry", "inlined_kernel", "kernel", "leaf_kernel", "rare_entry", "record"]

@@ -67,8 +67,10 @@ AVAILABLE = (
 """Whether this numba is one whose inner side is known."""
 
 
-UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-"""The option of compiling without reference counting."""
+_COUNTS = hasattr(DefaultOptions, "_nrt")
+COUNTED: dict[str, Any] = {"_nrt": True} if _COUNTS else {}
+UNCOUNTED: dict[str, Any] = {"_nrt": False} if _COUNTS else {}
+"""The options of compiling with and without reference counting; numba hands the caller's down if none is stated."""
 
 if hasattr(config, "_config_fname"):
     # numba takes settings from a .numba_config.yaml too, if one lies in the folder that a command is called in; what a
@@ -183,6 +185,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         """Return what was lowered as machine code that Python can call."""
         context, described = lowered.target_context, lowered.fndesc
         library = context.codegen().create_library(described.qualname)
+        library.environment = described.env_name
         library.enable_object_caching()
         with context.push_code_library(library):
             context.create_cpython_wrapper(

@@ -39,13 +39,23 @@ def entry(*arguments: Any) -> Callable[[Function], Function]:
     return declared
 
 
+def rare_entry(*arguments: Any) -> Callable[[Function], Function]:
+    """Declare a kernel that few scenarios call, and that takes long to compile: when it is called first, not before."""
+
+    def declared(kernel: Function) -> Function:
+        kernel.declared, kernel.rare = arguments, True  # type: ignore[attr-defined]
+        return kernel
+
+    return declared
+
+
 def entries_of(*modules: ModuleType) -> tuple[Any, ...]:
-    """Return the kernels that modules declare as entries, in the order in which they stand there."""
+    """Return the kernels that modules declare as entries, but for rare ones, in the order in which they stand there."""
     return tuple(
         value
         for module in modules
         for value in vars(module).values()
-        if hasattr(value, "declared") and value.__module__ == module.__name__
+        if hasattr(value, "declared") and not hasattr(value, "rare") and value.__module__ == module.__name__
     )
 
 

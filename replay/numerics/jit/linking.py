@@ -24,6 +24,8 @@ except ImportError:  # another numba
 class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """The LLVM code of one function; what it calls is in the libraries it links, until `emit` puts all into one."""
 
+    environment = ""
+    """Name of the variable that holds what the function that Python calls needs of Python."""
     _emitted = False
     _shared_module: Any
 
@@ -50,16 +52,21 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         one pass, a cone's walk of the tree and a ray's took twice as long; the other costs a fifth of the passes).
         """
         self._link_reached(self._final_module)
+        for variable in self._final_module.global_variables:
+            environment = variable.name.startswith("_ZN08NumbaEnv") and not variable.is_declaration
+            if environment and variable.name != self.environment:
+                # of functions that are taken in, and need none: seen by others, it would stand for that of the same
+                # function where Python calls it, which would be left without
+                variable.linkage = "internal"
         for options in ({"loop_vectorize": False}, {}):
             manager, builder = self._codegen._module_pass_manager(**options)
             manager.run(self._final_module, builder)
         self._final_module.verify()
         self._finalize_final_module()
         self._emitted = True
-        for variable in self._final_module.global_variables:
-            environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
-            if environment is not None and not variable.is_declaration:
-                JITCPUCodegen.set_env(self._codegen, variable.name, environment)
+        own = lookup_environment(self.environment)
+        if own is not None:
+            JITCPUCodegen.set_env(self._codegen, self.environment, own)
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Return machine code and, in place of code for other functions to take in, the names of what it defines."""

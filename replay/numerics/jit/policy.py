@@ -30,7 +30,7 @@ def kernel(function: Function) -> Function:
     and no contraction (every operation rounds as IEEE 754 says), and division by zero gives inf or NaN as in NumPy:
     kernels decide by comparison before they divide.
     """
-    return cast(Function, _compiled(function, {}))
+    return cast(Function, _compiled(function, compiler.COUNTED))
 
 
 def leaf_kernel(function: Function) -> Function:

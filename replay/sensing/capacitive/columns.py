@@ -9,7 +9,7 @@ from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns, Field
 
 _MEASURED = "Capacitive sensors: output voltage as measured [V]"
-_CHART = "Capacitive sensors: drop of the output voltage [V]"
+_CHART = "Capacitive sensors: output voltage [V]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,13 @@ class CapacitiveColumns(Columns):
     """
 
     capacitance: Annotated[Floats, Field(unit="F", gate="saturated")]
-    output_voltage: Annotated[Floats, Field(unit="V", gate="saturated")]
-    delta_output: Annotated[Floats, Field(unit="V", gate="saturated", chart=_CHART)]
+    output_voltage: Annotated[Floats, Field(unit="V", gate="saturated", chart=_CHART, spoken="output")]
+    delta_output: Annotated[Floats, Field(unit="V", gate="saturated", spoken="output drop")]
     saturated: Annotated[Flags, Field(open=(0,), events={"saturation": 3})]
     touching: Annotated[Flags, Field(begins=("touch",))]
-    per_object: Annotated[Floats, Field(unit="F", gate="saturated", label="capacitance", each="objects")]
+    per_object: Annotated[
+        Floats, Field(unit="F", gate="saturated", label="capacitance", spoken="share", each="objects")
+    ]
     increase: Annotated[Floats | None, Field(unit="F", gate="saturated", since=2)] = None
     error: Annotated[Floats | None, Field(unit="F", gate="unresolved", since=2)] = None
     unresolved: Annotated[Flags | None, Field(open=(0,), events={"unresolved": 3}, since=2)] = None

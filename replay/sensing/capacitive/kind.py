@@ -37,6 +37,7 @@ class Capacitive(SensorKind):
     part = CapacitiveSensorPart
     method = CapacitiveMethod
     revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "bem": 1}
+    slow = ELECTROSTATIC
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation
     expected = (
@@ -51,7 +52,6 @@ class Capacitive(SensorKind):
         condition=CapacitiveCondition,
         threshold=lambda condition: condition.output.below,
         dimension=VOLTAGE,
-        charted=lambda part, threshold: part.supply - threshold,
     )
     columns = CapacitiveColumns
 

@@ -16,6 +16,8 @@ Tolerance = Annotated[float, Quantity("Tolerance", NUMBER, at_least=1e-12, below
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
 
+SUPPLY = 2.5
+"""Supply voltage [V] of a sensor of which none is stated."""
 
 ELECTROSTATIC = ("bem",)
 """The methods that compute charges on conductors."""
@@ -43,7 +45,7 @@ class CapacitiveSensorPart(Part):
     """[F/m]; a fitted number, see METHODS 4.3."""
     stray_capacitance: StrayCapacitance = 0.0
     """What the sensor reads while nothing is near [F]: cables and its own surroundings; added to what is sensed."""
-    supply: Supply = 2.5
+    supply: Supply = SUPPLY
     """Supply voltage [V]."""
     side: Literal["front", "both"] = "front"
     """"front" counts only what lies on the plates' +z side."""

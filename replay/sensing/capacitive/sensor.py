@@ -12,7 +12,7 @@ from replay.numerics import transforms
 from replay.numerics.arguments import as_float, as_floats
 from replay.numerics.arrays import Floats
 from replay.sensing.capacitive.integral import SIDES, check_half_size
-from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
+from replay.sensing.capacitive.part import SUPPLY, VACUUM_PERMITTIVITY
 
 FACES = ("all", "facing")
 
@@ -63,7 +63,7 @@ class CapacitiveSensor:
     plates: tuple[Plate, ...]
     coupling: float
     permittivity: float = VACUUM_PERMITTIVITY
-    supply: float = 2.5
+    supply: float = SUPPLY
     stray_capacitance: float = 0.0
     side: str = "front"
     faces: str = "all"
@@ -99,7 +99,7 @@ def _is_rigid(T: Floats) -> bool:
     return bool(np.abs(products - np.eye(3)).max() < 1e-9 and np.linalg.det(T[:3, :3]) > 0.0)
 
 
-def output_voltage(capacitance: ArrayLike, *, coupling: float, supply: float = 2.5) -> NDArray[np.float64]:
+def output_voltage(capacitance: ArrayLike, *, coupling: float, supply: float = SUPPLY) -> NDArray[np.float64]:
     """Return V_out = C_couple / (C_couple + C) V_in.
 
     Args:

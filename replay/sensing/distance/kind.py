@@ -42,7 +42,6 @@ class Distance(SensorKind):
         condition=DistanceCondition,
         threshold=lambda condition: condition.below,
         dimension=LENGTH,
-        charted=lambda part, threshold: threshold,
     )
     columns = DistanceColumns
 

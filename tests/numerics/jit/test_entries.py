@@ -47,7 +47,7 @@ def test_entries_of_a_module_are_those_it_declares_itself():
     import replay.collision.narrow as narrow
     import replay.collision.pipeline as pipeline
 
-    assert entries_of(narrow) == (narrow.decide,)
+    assert entries_of(narrow) == (narrow.decide_by_doubles,)  # the others are rare
     assert entries_of(pipeline) == ()
 
 

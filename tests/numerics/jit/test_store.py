@@ -12,6 +12,7 @@ import pytest
 
 from replay.numerics import remarks
 from replay.numerics.jit import store
+from tests.numerics.jit.conftest import CALLEE, CALLER
 
 HITS = "print(outer(1.0), sum(outer.stats.cache_hits.values()))"
 
@@ -281,3 +282,17 @@ def test_numbas_own_cache_is_mended_too(package, damage):
         kept.write_bytes(kept.read_bytes()[:-10] if damage == "kernel" else b"")
     assert package.run(HITS) == "20.0 0"
     assert package.run(HITS) == "20.0 1"
+
+
+def test_a_kernel_that_returns_arrays_is_whole_after_one_that_has_taken_it_in(package):
+    package.write(
+        "geometry/callee.py", CALLEE.format("1.0") + "\n\n@kernel\ndef rows(n):\n    return np.ones((n, 2))\n"
+    )
+    package.write("collision/caller.py", CALLER + "\n\n@kernel\ndef total(n):\n    return rows(n).sum()\n")
+    for name in ("geometry/callee.py", "collision/caller.py"):
+        text = (package.root / name).read_text().replace("import inner", "import inner, rows")
+        package.write(name, "import numpy as np\n" + text)
+    one_then_other = "from replay.geometry.callee import rows; print(total(3), rows(2).sum())"
+    for _ in range(2):  # compiled, and from files
+        assert package.run(one_then_other) == "6.0 4.0"
+    assert package.run("from replay.geometry.callee import rows; print(rows(2).sum(), total(3))") == "4.0 6.0"

@@ -10,6 +10,12 @@ import mpmath as mp
 from tests.numerics import references
 
 Corner = list[mp.mpf]
+TOLERANCE = 3e-14  # measured worst of 10 000 cases of 21 families: 7e-15 (close)
+
+
+def error(value: float, expected: mp.mpf) -> float:
+    """Return a relative error; where nothing is expected, the value."""
+    return abs(float((mp.mpf(float(value)) - expected) / expected)) if expected else abs(float(value))
 
 
 def plate_integral(triangle: Sequence[Sequence[float]], half_size: Sequence[float], side: str) -> mp.mpf:

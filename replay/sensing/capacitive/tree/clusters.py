@@ -14,6 +14,7 @@ from numba import float32, float64, int64
 from replay.geometry.tree import Tree
 from replay.numerics.arrays import Floats, Integers, Singles
 from replay.numerics.jit import entry, kernel, leaf_kernel, record
+from replay.numerics.kept import kept
 from replay.sensing.capacitive.tree.moments import gather_moments
 from replay.sensing.capacitive.tree.registers import (
     AREA,
@@ -69,6 +70,7 @@ CLUSTERS_TYPE = record(
 )
 
 
+@kept
 def make_clusters(triangles: Floats, tree: Tree) -> Clusters:
     """Return the clusters of triangles (n, 3, 3) [m] under their tree; their size must be from 1e-30 to 1e30 m.
 

@@ -1,0 +1,294 @@
+"""What differs, as what people see of it: one effect for each pair, sensor and motion, the worst first.
+
+What only follows from a reading (which triangle, which case, whether a clearance was evaluated, coordinates of the
+point) is folded under the reading it belongs to and counted once with it.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from replay.comparison import quantities
+from replay.comparison.difference import Difference, EventDifference, Fate, SignalDifference
+from replay.comparison.rules import EXACT
+from replay.errors import count
+from replay.sensing.kinds import KINDS
+
+
+class Severity(enum.IntEnum):
+    """How much an effect matters, the worst first."""
+
+    BROKEN = 0  # an expectation does not hold
+    CRASHED = 1  # there is no result
+    CONTACT = 2  # a contact appears or vanishes
+    CONTACT_TIME = 3  # a contact begins or ends at another time
+    CLEARANCE = 4
+    READING = 5  # of a sensor, or how something moves
+    UNCOMPARED = 6  # there is nothing to compare with
+    BOOKKEEPING = 7  # nothing that is measured
+
+    @property
+    def words(self) -> str:
+        """What it is called on pages."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Severity.BROKEN: "broken expectation",
+    Severity.CRASHED: "no result",
+    Severity.CONTACT: "contact appears or vanishes",
+    Severity.CONTACT_TIME: "contact moves in time",
+    Severity.CLEARANCE: "clearance",
+    Severity.READING: "reading",
+    Severity.UNCOMPARED: "nothing to compare with",
+    Severity.BOOKKEEPING: "bookkeeping",
+}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What differs of one pair, one sensor, or the motion.
+
+    Attributes:
+        severity: how much it matters.
+        size: how large it is, in tolerances.
+        text: in words and numbers: "contact 33 ms later".
+        subject: the pair, the sensor, the joint or the link: "forearm/tube | person/body".
+        signals: full names of all signals that differ of it, the one that the text is about first.
+        at: the moment to look at [s]; None where there is none.
+    """
+
+    severity: Severity
+    size: float
+    text: str
+    subject: str = ""
+    signals: tuple[str, ...] = ()
+    at: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.text}: {self.subject}" if self.subject else self.text
+
+
+_COLLISION = "/collision"
+_MOTION = ("/joint_states", "/tf")
+
+
+def effects(found: Difference, limits: Mapping[str, float] | None = None) -> tuple[Effect, ...]:
+    """Return what decides of a difference, the worst first.
+
+    Args:
+        found: the difference.
+        limits: smallest clearances [m] that are expected, by pair.
+    """
+    by_item: dict[tuple[str, str], list[SignalDifference]] = {}
+    for item in found.deciding:
+        topic = item.signal.topic
+        key = ("motion", "") if topic in _MOTION else (topic, item.signal.name if topic == _COLLISION else "")
+        by_item.setdefault(key, []).append(item)
+    told = [_effect(key, items, limits or {}) for key, items in by_item.items()]
+    told += [*_absences(found), *_of_the_scene(found)]
+    return tuple(sorted(told, key=lambda effect: (effect.severity, -effect.size, effect.subject)))
+
+
+def headline(found: Sequence[Effect]) -> str:
+    """Return the worst effect, and how many more there are: "contact 33 ms later: a/b | c/d; 3 more readings"."""
+    if not found:
+        return ""
+    return f"{found[0]}; {count(len(found) - 1, 'more reading')}" if len(found) > 1 else str(found[0])
+
+
+def _effect(key: tuple[str, str], items: list[SignalDifference], limits: Mapping[str, float]) -> Effect:
+    topic, name = key
+    if topic == "motion":
+        worst, text = _motion(items)
+        severity, subject = Severity.READING, worst.signal.name
+    elif topic == _COLLISION:
+        severity, worst, text = _pair(items, limits.get(name))
+        subject = name.replace("|", " | ")
+    else:
+        severity, worst, text = _sensor(items)
+        subject = topic.split("/", 2)[2]
+    rest = (item.signal.full_name for item in items if item is not worst)
+    return Effect(severity, size(worst), text, subject, (worst.signal.full_name, *rest), _moment(worst))
+
+
+def _moment(item: SignalDifference) -> float:
+    """Return when a signal differs in the way that matters: at its first wrong event, or its worst value."""
+    wrong = [event for event in item.events if not event.allowed]
+    moments = [event.candidate or event.baseline for event in wrong]
+    if moments and moments[0] is not None:
+        return moments[0].time
+    return item.first.time if item.worst_abs is None else item.worst_abs.at.time
+
+
+def size(item: SignalDifference) -> float:
+    """Return how large a difference is in tolerances; where there is none, in 1e-9 of the value."""
+    tolerance = EXACT if item.rule is None else item.rule.tolerance
+    if item.event_count:
+        if item.lone_events:
+            return 1e6 * max(item.frames, 1)
+        if item.max_shift_frames:
+            return item.max_shift_frames / max(tolerance.frames, 1)
+        return item.max_shift / max(tolerance.bracket or tolerance.time, 1e-6)
+    worst = item.worst_abs
+    if worst is None:
+        return math.inf
+    scale = max(abs(worst.baseline), abs(worst.candidate))
+    return worst.error / max(tolerance.abs, tolerance.rel * scale, 1e-9 * scale, 1e-300)
+
+
+def _pair(items: Sequence[SignalDifference], limit: float | None) -> tuple[Severity, SignalDifference, str]:
+    """Return what matters most of a pair of shapes, the signal that says so, and the words for it."""
+    by_field = {item.signal.field: item for item in items}
+    level = by_field.get("level")
+    if level is not None:
+        contacts = [event for event in level.events if event.what.startswith("contact ") and not event.allowed]
+        alone = [event for event in contacts if event.fate is not Fate.SHIFTED]
+        if alone:
+            return Severity.CONTACT, level, _lone_contact(alone)
+        if contacts:
+            return Severity.CONTACT_TIME, level, _shifted(_most_shifted(contacts))
+    if "undecided" in by_field:
+        return Severity.CONTACT, by_field["undecided"], _event(by_field["undecided"])
+    clearance = by_field.get("clearance")
+    if clearance is not None and (clearance.worst_abs is not None or clearance.nan):
+        return Severity.CLEARANCE, clearance, _clearance(clearance, limit)
+    if level is not None:
+        return Severity.READING, level, _event(level)
+    first = _first_of(items, ("between", "evaluated", "clearance_bound", "clearance"))
+    return Severity.BOOKKEEPING, first, _any(first)
+
+
+def _clearance(item: SignalDifference, limit: float | None) -> str:
+    expected = "" if limit is None else f" (limit {quantities.shown(limit, 'm')})"
+    worst, least = item.worst_abs, item.least
+    if worst is None:
+        return f"clearance known in one run only, in {count(item.nan, 'frame')}{expected}"
+    tolerance = worst.error * 1e-3
+    if least is not None and abs(least[0] - least[1]) > tolerance:
+        return f"smallest clearance {quantities.change(*least, 'm')}{expected}"
+    return f"clearance {quantities.change(worst.baseline, worst.candidate, 'm')} at {_time(worst.at.time)}{expected}"
+
+
+def _sensor(items: Sequence[SignalDifference]) -> tuple[Severity, SignalDifference, str]:
+    kind = KINDS[items[0].signal.topic.split("/")[1]]
+    gates = {field.gate for field in kind.columns.fields() if field.gate}
+    main = [field.name for field in kind.columns.fields() if field.chart]
+    other = [field.name for field in kind.columns.fields() if field.unit and not field.letters and not field.each]
+    states = [field.name for field in kind.columns.fields() if field.events or field.begins]
+    gate = next((item for item in items if item.signal.field in gates and item.event_count), None)
+    if gate is not None:
+        return Severity.READING, gate, _event(gate)
+    for names in (main, states, other):
+        chosen = [item for item in items if item.signal.field in names]
+        if chosen:
+            worst = max(chosen, key=size)
+            return Severity.READING, worst, _any(worst)
+    worst = max(items, key=size)
+    return Severity.BOOKKEEPING, worst, _any(worst)
+
+
+def _motion(items: Sequence[SignalDifference]) -> tuple[SignalDifference, str]:
+    """Return what moves most differently: a joint where one does, else a link."""
+    positions = [item for item in items if item.signal.field == "position"]
+    worst = max(positions or items, key=size)
+    what = "joint" if worst.signal.topic == "/joint_states" else "link"
+    others = len({item.signal.item for item in items}) - 1
+    return worst, f"{what} {_any(worst)}{f' ({others} more move differently)' if others else ''}"
+
+
+def _first_of(items: Sequence[SignalDifference], fields: Sequence[str]) -> SignalDifference:
+    order = {name: k for k, name in enumerate(fields)}
+    return min(items, key=lambda item: order.get(item.signal.field, len(order)))
+
+
+def _any(item: SignalDifference) -> str:
+    """Return how a signal differs in words and numbers."""
+    if item.event_count:
+        return _event(item)
+    name = _label(item)
+    if item.worst_abs is None:
+        return f"{name} has no number in one run, first at {_time(item.first.time)}"
+    worst = item.worst_abs
+    return f"{name} {quantities.signed(worst.candidate - worst.baseline, item.signal.unit)} at {_time(worst.at.time)}"
+
+
+def _label(item: SignalDifference) -> str:
+    """Return what sentences call a field."""
+    kind = KINDS.get(item.signal.topic.split("/")[1])
+    spoken = {field.name: field.spoken for field in kind.columns.fields()} if kind else {}
+    return spoken.get(item.signal.field, item.signal.field.replace("_", " "))
+
+
+def _event(item: SignalDifference) -> str:
+    wrong = [event for event in item.events if not event.allowed] or list(item.events)
+    alone = [event for event in wrong if event.fate is not Fate.SHIFTED]
+    if not alone:
+        return _shifted(_most_shifted(wrong))
+    event = alone[0]
+    at = event.baseline or event.candidate
+    assert at is not None
+    what = event.what.removesuffix(" begins")
+    if event.what.endswith(" begins"):
+        return f"{what} {'appears' if event.fate is Fate.APPEARED else 'vanishes'}, {_when(event, at.time)}"
+    new = event.fate is Fate.APPEARED
+    if event.what.endswith(" ends"):
+        return f"{event.what.removesuffix(' ends')} {'ends' if new else 'no longer ends'} at {_time(at.time)}"
+    return f"{what} {'only in this run' if new else 'no longer'}, {_when(event, at.time)}"
+
+
+def _when(event: EventDifference, time: float) -> str:
+    return f"at {_time(time)}" if event.fate is Fate.APPEARED else f"was at {_time(time)}"
+
+
+def _lone_contact(events: Sequence[EventDifference]) -> str:
+    """Return "contact appears at 3.2 s, until 3.4 s" of beginnings and ends that one run has alone."""
+    first = next((event for event in events if event.what == "contact begins"), events[0])
+    at = first.baseline or first.candidate
+    assert at is not None
+    gone = first.fate is Fate.VANISHED
+    if first.what == "contact begins":
+        ends = (event for event in events if event.what == "contact ends" and event.fate is first.fate)
+        until = next((end for end in ((e.baseline or e.candidate) for e in ends) if end and end.time >= at.time), None)
+        ended = "" if until is None else f", until {_time(until.time)}"
+        return f"contact {'vanishes, was' if gone else 'appears'} at {_time(at.time)}{ended}"
+    return f"contact {'no longer ends, did' if gone else 'ends'} at {_time(at.time)}"
+
+
+def _most_shifted(events: Sequence[EventDifference]) -> EventDifference:
+    return max(events, key=lambda event: abs(event.shift or 0.0))
+
+
+def _shifted(event: EventDifference) -> str:
+    """Return "contact 33 ms later" of a beginning and "contact ends 33 ms later" of an end."""
+    shift = event.shift or 0.0
+    if not shift and event.shift_frames:
+        shift = float(event.shift_frames)
+    much = f"{quantities.shown(abs(shift), 's')} {'later' if shift > 0 else 'earlier'}"
+    return f"{event.what.removesuffix(' begins')} {much}"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.6g} s"
+
+
+def _absences(found: Difference) -> Iterator[Effect]:
+    for where, items in (("is gone", found.missing), ("is new", found.extra)):
+        for item in items:
+            if item.decides:
+                names = tuple(signal.full_name for signal in item.signals)
+                yield Effect(Severity.READING, math.inf, f"{item.label} {where}", "", names)
+    if found.frames.decides:
+        for number, where in ((found.frames.missing, "missing"), (found.frames.extra, "more")):
+            if number:
+                yield Effect(Severity.READING, float(number), f"{count(number, 'frame')} {where}")
+
+
+def _of_the_scene(found: Difference) -> Iterator[Effect]:
+    if found.scene:
+        names = tuple(change.name for change in found.scene)
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        yield Effect(Severity.BOOKKEEPING, float(len(names)), f"scene: {names[0]}{more} changed", "", names)
