@@ -60,6 +60,14 @@ def said(folder: Path) -> list[str]:
     return []
 
 
+def is_there(file: Path) -> bool:
+    """Return whether a file is in a scenario's folder; no where that cannot be looked into."""
+    try:
+        return file.is_file()
+    except OSError:
+        return False
+
+
 def unwritable(result: CaseResult, error: WriteError) -> CaseResult:
     """Return the result of a scenario whose folder cannot be written."""
     failed = CaseResult(result.name, CaseStatus.FAILED, error=result.error or str(error), invalid=result.invalid)

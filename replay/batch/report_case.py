@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from replay.batch.case_folder import LOG, said
+from replay.batch.case_folder import LOG, is_there, said
 from replay.batch.judged import OVERLAY, Judged
 from replay.batch.written import RESULT
 from replay.comparison import report_html
@@ -72,17 +72,10 @@ def _log(item: Judged, folder: Path) -> str:
 
 def _links(item: Judged, folder: Path) -> tuple[tuple[str, str], ...]:
     names = [name.format(name=item.name) for name in FILES]
-    links = [(name, quote(os.fsencode(name))) for name in names if _is_there(folder / name)]
+    links = [(name, quote(os.fsencode(name))) for name in names if is_there(folder / name)]
     if item.finding is not None:
         links.append(("baseline", _address(item.finding.baseline.resolve(), folder.resolve())))
     return tuple(links)
-
-
-def _is_there(file: Path) -> bool:
-    try:
-        return file.is_file()
-    except OSError:
-        return False
 
 
 def _address(file: Path, folder: Path) -> str:

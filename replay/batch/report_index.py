@@ -18,6 +18,7 @@ from typing import Any
 from urllib.parse import quote
 
 import replay
+from replay.batch.case_folder import is_there
 from replay.batch.groups import CauseGroup, groups
 from replay.batch.history import Past
 from replay.batch.judged import PAGE, PICTURE, Judged, Regression, RegressVerdict
@@ -89,7 +90,7 @@ def _data(found: Regression, ordered: Sequence[Judged], grouped: Sequence[CauseG
                 printable(item.message[:_MESSAGE]),
                 "" if item.verdict.fine else past.since.get(item.name, ""),
                 [tags.index(tag) for tag in item.tags],
-                address(item, PICTURE) if (found.run.directory / item.name / PICTURE).is_file() else "",
+                address(item, PICTURE) if is_there(found.run.directory / item.name / PICTURE) else "",
                 sparkline(curve) if len([value for value in curve if value is not None]) > 1 else "",
             ]
         )

@@ -43,6 +43,9 @@ SCENES = (
     "experiments/parallel_30cm",
     "experiments/pivot_10cm",
     "experiments/pivot_20cm",
+    "carm_bodyguard_stops",
+    "carm_bodyguard_stops_late",
+    "carm_bodyguard_stops_thesis",
 )
 """All shipped scenes."""
 GUARDED = SCENES[0]

@@ -72,7 +72,7 @@ def write(reports: Sequence[Report], directory: Path) -> list[Path]:
 def earlier_seconds(directory: Path) -> dict[str, float]:
     """Return what each benchmark took in the run whose report is in a folder [s]; none if there is no report."""
     try:
-        found = typed(read_json_file(directory / _JSON), _Written)["benchmarks"]
+        found = typed(read_json_file(directory / _JSON), _WrittenBench)["benchmarks"]
     except (OSError, ValueError):
         return {}
     return {name: report["seconds"] for name, report in found.items()}
@@ -82,7 +82,7 @@ class _Timed(TypedDict):
     seconds: float
 
 
-class _Written(TypedDict):
+class _WrittenBench(TypedDict):
     benchmarks: dict[str, _Timed]
 
 

@@ -18,8 +18,12 @@ from replay.guarding.guard import Guard
 from replay.kinematics.clock import Clock
 from replay.kinematics.profiles import Profile
 
-ROUNDS = 200
-"""Cap of the search for the time of a ramp; beyond it the largest speed of all that is left of the script counts."""
+ROUNDS = 5_000
+"""Cap of the search for the time of a ramp; beyond it the largest speed of all that is left of the script counts. Each
+round comes nearer by a constant share, which is small where the script speeds up as fast as the ramp grows."""
+
+_SAME = 1.0 + 2.0**-50
+"""Times that are as near as this are one: what is left of the search is rounding."""
 
 Line = tuple[float, float, float]
 """From when on [s] a factor is a straight line, its value then, and its slope [1/s]."""
@@ -143,8 +147,8 @@ class Plan:
         found = time(0.0)
         for _ in range(ROUNDS):
             longer = time(0.5 * (begin + end) * found)
-            if longer <= found:
-                return found
+            if longer <= found * _SAME:
+                return max(longer, found)
             found = longer
         return time(math.inf)
 

@@ -36,13 +36,16 @@ _lock = threading.Lock()
 
 def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """Return a function that answers the same question once: arguments are arrays, numbers, texts, and tuples, lists
-    and dataclasses of these."""
+    and dataclasses of these; with others it is called each time, to say what is wrong with them."""
     name = f"{function.__module__}.{function.__qualname__}"
 
     @wraps(function)
     def ask(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         global _total  # noqa: PLW0603
-        parts = [*_content((args, kwargs))]
+        try:
+            parts = [*_content((args, kwargs))]
+        except TypeError:  # the function says what is wrong with them
+            return function(*args, **kwargs)
         if sum(map(len, parts)) > _LARGEST:
             return function(*args, **kwargs)
         digest = hashlib.sha256(name.encode())

@@ -84,7 +84,10 @@ def test_resuming_reuses_what_is_still_valid_and_says_why_it_runs_the_rest(ran, 
     assert remarks.said[1] == "good1: runs again: changed: file good1.yaml"
     assert remarks.said[2].startswith("good2: runs again: damaged")
     again = files_of(tmp_path)
-    assert {str(name) for name in wanted if wanted[name] != again[name]} == {"good1/good1.mcap"}
+    assert {str(name) for name in wanted if wanted[name] != again[name]} == {
+        "good1/good1.mcap",
+        "good1/result.json",  # with the numbers of its readings
+    }
     model = BUILTIN_MODELS["thesis2015"]
     run = run_all(scenarios[:1], tmp_path, rrd=False, resume=True, model=model, execution=TWO, watch=remarks)
     assert remarks.said[3].startswith("good0: runs again: changed: model ")

@@ -11,7 +11,7 @@ from replay.bench import carm, inputs
 from replay.bench.goals import PROMISES, Goal, advantage, in_order
 from replay.bench.measure import Row
 from replay.geometry.solid import signed_volume
-from replay.geometry.winding import corner_indices, topology
+from replay.geometry.winding import corner_indices, sides, topology
 
 
 def test_a_spiral_covers_the_sphere_evenly():
@@ -30,7 +30,7 @@ def test_a_spiral_covers_the_sphere_evenly():
 def test_a_torus_is_closed_outward_and_on_its_surface(count, major, minor, less):
     triangles = inputs.torus(count, major=major, minor=minor)
     assert len(triangles) == pytest.approx(count, rel=0.1)
-    assert topology(corner_indices(triangles.round(12))[1]).is_closed
+    assert topology(sides(corner_indices(triangles.round(12))[1])).is_closed
     x, y, z = triangles.reshape(-1, 3).T
     np.testing.assert_allclose(np.hypot(np.hypot(x, y) - major, z), minor, rtol=0, atol=1e-14)
     volume = 2 * math.pi**2 * major * minor**2

@@ -86,7 +86,8 @@ def test_a_wrong_recording_is_never_a_fast_one(monkeypatch):
 
 def test_every_scene_that_is_shipped_is_in_the_benchmark():
     found = [path for folder in (shipped.FOLDER, shipped.FOLDER / "experiments") for path in folder.glob("*.yaml")]
-    names = {str(path.relative_to(shipped.FOLDER).with_suffix("")) for path in found} - {"rules"}
+    swept = "carm_bodyguard_reaction"  # its cases are carm_bodyguard_stops with another number
+    names = {str(path.relative_to(shipped.FOLDER).with_suffix("")) for path in found} - {"rules", swept}
     assert set(recording.SCENES) == names
 
 

@@ -21,7 +21,7 @@ ROOT = Path(replay.__file__).parents[1]
     ("arguments", "message"),
     [
         (["run"], "Missing argument"),
-        (["nonsense"], "No such command 'nonsense'; run, validate"),
+        (["nonsense"], "No such command 'nonsense'; new, run, validate"),
         (["valdate", "x"], "No such command 'valdate'; did you mean 'validate'?; see replay --help"),
         (["run", "x", "--workers", "0"], "'0' is no number of processes; write 1 or more; see replay run --help"),
         (["run", "x", "--shard", "3/2"], "must be i/n with 1 <= i <= n, such as 2/4; see replay run --help"),

@@ -15,7 +15,7 @@ CUBE = primitives.cube(1.0).triangles
 
 
 def is_closed(triangles):
-    return topology(corner_indices(triangles)[1]).is_closed
+    return topology(sides(corner_indices(triangles)[1])).is_closed
 
 
 def volume(triangles):

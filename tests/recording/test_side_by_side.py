@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 from replay.errors import ViewerError
 from replay.recording.rerun_log import RerunWriter
-from replay.recording.side_by_side import _Contents, one_recording, side_names
+from replay.recording.side_by_side import Contents, one_recording, side_names
 from tests.recording import moving
 
 
@@ -55,7 +55,7 @@ def test_everything_of_both_is_there(tmp_path: Path) -> None:
 
 def eyes(path: Path) -> np.ndarray:
     """Return position and target (views, 2, 3) [m] of the eyes of a recording's views."""
-    found = _Contents()
+    found = Contents()
     found.look_from(RrdReader(str(path)))
     return np.array(found.eyes)
 

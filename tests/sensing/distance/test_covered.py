@@ -40,4 +40,6 @@ def test_a_sensor_inside_a_body_reads_its_surface_and_says_so(tmp_path):
     assert result.notes[1:] == (
         "distance sensor 'away' is inside wall/slab in 66 of 301 frames; it reads the surface around it, from within",
         "distance sensor 'off' is inside wall/slab in 250 of 301 frames; it reads the surface around it, from within",
+        "the distance sensor on sees arm/box of its own machine in the first frame; "
+        "write ignore: [arm] below it, if it should not",
     )

@@ -133,7 +133,7 @@ def test_samples_drop_out_as_often_as_written() -> None:
 
 
 def test_what_is_too_near_stays_so_through_samples_and_delay() -> None:
-    chain = Chain("distance", "tip", LengthSignal(rate=RATE / 2, delay=Fraction(1, 30)), RATE, 1.0)
+    chain = Chain("distance", "tip", LengthSignal(rate="30 Hz", delay="1/30 s"), RATE, 1.0)
     near = np.arange(12) // 4 % 2 == 1
     told_, beyond, _ = chain.run(0, np.ones(12), near, chain.begin())
     assert np.isnan(told_).tolist() == [True] * 2 + [False] * 10
