@@ -71,7 +71,7 @@ def test_shipped_scenarios_read_the_same(path):
     for scenario in load_cases(path):
         # 6 Hz, with what stands still for longer than that
         (saving, columns), (full, others) = both(thinned(scenario, 37))
-        compare(columns, others, saving.scene.model.capacitive.options()["rtol"])
+        compare(columns, others, saving.scene.model.capacitive.options().get("rtol", 1e-12))
         assert (full.collision.counters.narrow, full.collision.counters.repeated) == (
             columns["collision.level"].size,
             0,
