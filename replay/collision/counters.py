@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from replay.collision import broad, crossing_search, interval_proof, narrow, traversal
+from replay.collision import broad, crossing_look, interval_proof, narrow, traversal
 
 
 @dataclass
@@ -64,7 +64,7 @@ class Counters:
         """Add the counts of `interval_proof.certify` and of `crossing_search.search`."""
         self.intervals_by_frames += proven[interval_proof.BY_FRAMES]
         self.intervals_searched += proven[interval_proof.IN_DOUBT]
-        self.moments += searched[crossing_search.MOMENTS]
+        self.moments += searched[crossing_look.MOMENTS]
         self.moment_queries += searched[traversal.QUERIES]
 
     def add(self, sieved: Sequence[int], decided: Sequence[int]) -> None:

@@ -14,7 +14,7 @@ from numba import float64, int64, uint8
 
 from replay.collision.bodies import AABB, BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import sphere_gap, volumes_meet
-from replay.collision.crossing_search import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
+from replay.collision.crossing_look import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.volume_gap import boxes_gap
 from replay.collision.way_sieve import root_gap, root_ratio
@@ -147,7 +147,7 @@ def certify(
         limit: up to which the narrow phase looked for distances [m].
         cap: largest bound that is told [m].
         between, bound: (n, P) out; `bound` is NaN and `between` UNDECIDED where there is doubt of a contact.
-        doubt: (n, P) out, bits of `crossing_search`.
+        doubt: (n, P) out, bits of `crossing_look`.
         counts: (COUNTS,) added to.
         scratch: (8, 4).
     """

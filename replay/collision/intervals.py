@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from replay.collision import crossing_search, interval_proof
+from replay.collision import crossing_look, crossing_search, interval_proof
 from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
-from replay.collision.crossing_search import PROVEN_ROUNDING, PROVEN_SHARE, Questions
+from replay.collision.crossing_look import PROVEN_ROUNDING, PROVEN_SHARE, Questions
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_steps import Chains
@@ -210,7 +210,7 @@ class Intervals:
             np.empty((8, 4)),
         )
         crossings = Crossings.none()
-        searched = np.zeros(crossing_search.COUNTS, dtype=np.int64)
+        searched = np.zeros(crossing_look.COUNTS, dtype=np.int64)
         if doubt.any():
             crossings = self._search(frames, head, course, doubt, between, bound, searched)
         self._counters.add_intervals(counts.tolist(), searched.tolist())

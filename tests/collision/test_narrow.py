@@ -12,7 +12,7 @@ from tests.collision import scenes
 
 
 def shell():
-    """Return an open box of six thick walls' corners: a surface that is collided by its triangles."""
+    """Return a cube with a small one inside its upper face: a surface that is collided by its triangles."""
     outer, dent = cube(2.0).triangles, cuboid((0.2, 0.2, 0.2)).triangles[:, ::-1] + np.array([0.0, 0.0, 0.9])
     return Solid(np.concatenate([outer, dent]))
 
