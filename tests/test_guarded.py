@@ -11,8 +11,12 @@ import pytest
 import replay
 from replay import guarded, simulation
 from replay.batch.case import CaseOrder, CaseStatus, describe, run_case
+from replay.cli.exit_codes import ExitCode
+from replay.cli.main import run
+from replay.comparison.effects import effects
 from replay.recording.export import tables
 from replay.scenario.load import load_cases, load_sources
+from replay.scenario.methods import METHOD_REVISIONS
 from replay.scenario.scene import build
 
 TEXT = """version: 1
@@ -209,6 +213,29 @@ def test_recordings_with_guards_are_read_back_run_again_exported_and_compared(tm
     assert alone.guards.state.tobytes() == recording.guards.state.tobytes()
 
 
+def test_reports_and_explanations_know_guards(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = []
+    for name, reaction in (("a", "55 ms"), ("b", "155 ms")):
+        made = scenario(STOP.replace("55 ms", reaction), signal="\n      signal: {rate: 30 Hz, bias: 1 mm}")
+        files.append(str(replay.record(made, tmp_path / name, rrd=False).mcap))
+    reports = ["--html", tmp_path / "d.html", "--junit", tmp_path / "d.xml", "--rrd", tmp_path / "both"]
+    assert run(["diff", *files, *map(str, reports)]) is ExitCode.DIFFERENT
+    assert "worst: distance -3 cm at" in capsys.readouterr().out, "0.3 m/s for 0.1 s longer"
+    (guard,) = [effect for effect in effects(replay.diff(*files)) if effect.subject == "stop"]
+    assert guard.text == "guard: state becomes braking 100 ms later"
+    trigger = 2.6  # as `test_results_tell_what_guards_did_and_resumed_ones_too` has it
+    assert guard.at == pytest.approx(trigger + 0.155, abs=1 / 60)
+    assert guard.signals[0].startswith("/guards/")
+    late = float(replay.read(files[0]).time[-1]) / 1e9  # long after it stopped, where the script is somewhere else
+    assert run(["explain", files[0], "/distance/tip", "--at", str(late)]) is ExitCode.FINE
+    text = capsys.readouterr().out
+    told = replay.read(files[0]).distance
+    shown = f"{100.0 * told.distance[-1, 0]:.6g} cm"
+    assert f"  distance {shown}" in text
+    assert f"distance.exact@{METHOD_REVISIONS['distance.exact']}: {shown}" in text
+    assert f"  measured {100.0 * told.measured[-1, 0]:.6g} cm" in text
+
+
 def test_a_recorded_motion_is_slowed_down_too(tmp_path: Path) -> None:
     times = np.arange(0.0, 4.0, 0.05)
     rows = [f"{t:.2f},{0.25 * t:.6f}" for t in times]
@@ -235,6 +262,12 @@ collision: {margin: 30 cm}
     assert result.status is CaseStatus.BROKEN
     assert [outcome.passed for outcome in result.outcomes] == [True, True, True, False, True, False]
     assert result.outcomes[1].detail == "largest stopping distance 0.0615 m of cart"
+    numbers = {item.name: item for item in result.measures if item.name.startswith("expect")}
+    way, never = numbers["expect[0].stopping_distance.max"], numbers["expect[1].stops"]
+    assert (way.unit, way.subject, way.limit) == ("m", "cart", 0.07)
+    assert way.margin == pytest.approx(0.07 - 0.0615, rel=1e-9)
+    assert (never.value, never.limit, never.margin) == (1.0, 0.0, -1.0)
+    assert numbers["expect[2].stops.before"].value == pytest.approx(2.955, abs=1e-9)
     (stop,) = result.guards
     (joint,) = stop["joints"]
     assert stop["trigger"] == pytest.approx(2.6, abs=1e-9)
@@ -243,6 +276,7 @@ collision: {margin: 30 cm}
     assert stop["stopping_time"] == pytest.approx(0.055 + 0.3, rel=1e-12)
     clearance = 0.94 - columns(scenario())["positions"][-1, 0]
     assert stop["clearance_at_stop"] == pytest.approx(clearance, abs=1e-12)
+    assert numbers["expect[0].clearance_at_stop.min"].margin == pytest.approx(clearance - 0.14, abs=1e-12)
     assert stop["clearance"] <= clearance
     assert stop["clearance"] == pytest.approx(clearance, abs=5e-3)
     assert stop["contact"] is None

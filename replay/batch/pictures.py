@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from replay.batch.case_folder import is_there
 from replay.batch.judged import OVERLAY, PICTURE, Judged
 from replay.batch.watch import Watch
 from replay.comparison.both_sides import write_both_sides
@@ -33,7 +34,7 @@ def take_pictures(judged: Iterable[Judged], directory: Path, most: int, watch: W
     for item in judged:
         overlay = directory / item.name / OVERLAY.format(name=item.name)
         at = item.finding.effects[0].at if item.finding is not None and item.finding.effects else None
-        if most <= 0 or at is None or not overlay.is_file():
+        if most <= 0 or at is None or not is_there(overlay):
             continue
         if time.monotonic() - began > _SECONDS:
             watch.tell(f"no more pictures: they have taken {_SECONDS:.0f} s")

@@ -1,4 +1,4 @@
-"""What differs, as what people see of it: one effect for each pair, sensor and motion, the worst first.
+"""What differs, as what people see of it: one effect for each pair, sensor, guard and motion, the worst first.
 
 What only follows from a reading (which triangle, which case, whether a clearance was evaluated, coordinates of the
 point) is folded under the reading it belongs to and counted once with it.
@@ -15,6 +15,7 @@ from replay.comparison import quantities
 from replay.comparison.difference import Difference, EventDifference, Fate, SignalDifference
 from replay.comparison.rules import EXACT
 from replay.errors import count
+from replay.guarding.columns import GuardColumns
 from replay.sensing.kinds import KINDS
 
 
@@ -50,13 +51,13 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Effect:
-    """What differs of one pair, one sensor, or the motion.
+    """What differs of one pair, one sensor, one guard, or the motion.
 
     Attributes:
         severity: how much it matters.
         size: how large it is, in tolerances.
         text: in words and numbers: "contact 33 ms later".
-        subject: the pair, the sensor, the joint or the link: "forearm/tube | person/body".
+        subject: the pair, the sensor, the guard, the joint or the link: "forearm/tube | person/body".
         signals: full names of all signals that differ of it, the one that the text is about first.
         at: the moment to look at [s]; None where there is none.
     """
@@ -74,6 +75,10 @@ class Effect:
 
 _COLLISION = "/collision"
 _MOTION = ("/joint_states", "/tf")
+_GUARDS = "/guards"
+_ABOUT_A_PAIR = ("between", "evaluated", "clearance_bound")
+"""What only says how a pair's clearance is known."""
+_OF_GUARDS = [field.name for field in GuardColumns.fields() if field.each == "guards"]
 
 
 def effects(found: Difference, limits: Mapping[str, float] | None = None) -> tuple[Effect, ...]:
@@ -85,19 +90,29 @@ def effects(found: Difference, limits: Mapping[str, float] | None = None) -> tup
     """
     by_item: dict[tuple[str, str], list[SignalDifference]] = {}
     for item in found.deciding:
-        topic = item.signal.topic
-        key = ("motion", "") if topic in _MOTION else (topic, item.signal.name if topic == _COLLISION else "")
-        by_item.setdefault(key, []).append(item)
+        by_item.setdefault(_key(item), []).append(item)
     told = [_effect(key, items, limits or {}) for key, items in by_item.items()]
     told += [*_absences(found), *_of_the_scene(found)]
     return tuple(sorted(told, key=lambda effect: (effect.severity, -effect.size, effect.subject)))
 
 
 def headline(found: Sequence[Effect]) -> str:
-    """Return the worst effect, and how many more there are: "contact 33 ms later: a/b | c/d; 3 more readings"."""
+    """Return the worst effect, and how many more there are: "contact 33 ms later: a/b | c/d; 3 more readings".
+
+    Bookkeeping is not counted beside what is measured.
+    """
     if not found:
         return ""
-    return f"{found[0]}; {count(len(found) - 1, 'more reading')}" if len(found) > 1 else str(found[0])
+    more = sum(effect.severity is not Severity.BOOKKEEPING for effect in found[1:])
+    return f"{found[0]}; {count(more, 'more reading')}" if more else str(found[0])
+
+
+def _key(item: SignalDifference) -> tuple[str, str]:
+    """Return what a signal is of: a topic, and a pair or a guard on it; the clocks of joints belong to the motion."""
+    topic = item.signal.topic
+    if topic in _MOTION or (topic == _GUARDS and item.signal.field not in _OF_GUARDS):
+        return "motion", ""
+    return topic, item.signal.name if topic in (_COLLISION, _GUARDS) else ""
 
 
 def _effect(key: tuple[str, str], items: list[SignalDifference], limits: Mapping[str, float]) -> Effect:
@@ -108,6 +123,9 @@ def _effect(key: tuple[str, str], items: list[SignalDifference], limits: Mapping
     elif topic == _COLLISION:
         severity, worst, text = _pair(items, limits.get(name))
         subject = name.replace("|", " | ")
+    elif topic == _GUARDS:
+        worst = _first_of(items, ("condition", "state", "factor"))
+        severity, text, subject = Severity.READING, f"guard: {_any(worst)}", name
     else:
         severity, worst, text = _sensor(items)
         subject = topic.split("/", 2)[2]
@@ -116,11 +134,13 @@ def _effect(key: tuple[str, str], items: list[SignalDifference], limits: Mapping
 
 
 def _moment(item: SignalDifference) -> float:
-    """Return when a signal differs in the way that matters: at its first wrong event, or its worst value."""
+    """Return when a signal differs in the way that matters: at the event that is told, or its worst value."""
     wrong = [event for event in item.events if not event.allowed]
-    moments = [event.candidate or event.baseline for event in wrong]
-    if moments and moments[0] is not None:
-        return moments[0].time
+    if wrong:
+        told = next((event for event in wrong if event.fate is not Fate.SHIFTED), _most_shifted(wrong))
+        at = told.candidate or told.baseline
+        assert at is not None
+        return at.time
     return item.first.time if item.worst_abs is None else item.worst_abs.at.time
 
 
@@ -158,7 +178,7 @@ def _pair(items: Sequence[SignalDifference], limit: float | None) -> tuple[Sever
         return Severity.CLEARANCE, clearance, _clearance(clearance, limit)
     if level is not None:
         return Severity.READING, level, _event(level)
-    first = _first_of(items, ("between", "evaluated", "clearance_bound", "clearance"))
+    first = _first_of(items, _ABOUT_A_PAIR)
     return Severity.BOOKKEEPING, first, _any(first)
 
 
@@ -195,7 +215,7 @@ def _motion(items: Sequence[SignalDifference]) -> tuple[SignalDifference, str]:
     """Return what moves most differently: a joint where one does, else a link."""
     positions = [item for item in items if item.signal.field == "position"]
     worst = max(positions or items, key=size)
-    what = "joint" if worst.signal.topic == "/joint_states" else "link"
+    what = "link" if worst.signal.topic == "/tf" else "joint"
     others = len({item.signal.item for item in items}) - 1
     return worst, f"{what} {_any(worst)}{f' ({others} more move differently)' if others else ''}"
 
@@ -280,7 +300,9 @@ def _absences(found: Difference) -> Iterator[Effect]:
         for item in items:
             if item.decides:
                 names = tuple(signal.full_name for signal in item.signals)
-                yield Effect(Severity.READING, math.inf, f"{item.label} {where}", "", names)
+                told = all(s.topic == _COLLISION and s.field in _ABOUT_A_PAIR for s in item.signals)
+                severity = Severity.BOOKKEEPING if told else Severity.READING
+                yield Effect(severity, math.inf, f"{item.label} {where}", "", names)
     if found.frames.decides:
         for number, where in ((found.frames.missing, "missing"), (found.frames.extra, "more")):
             if number:

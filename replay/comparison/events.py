@@ -88,7 +88,7 @@ def tracks(
         names = dict(enumerate(categories, start=-1))
         names |= {state.value: state.name.lower().replace("_", " ") for state in field.states or ()}
         labels: dict[int | None, str] = {k: f"{field.name} becomes {text}" for k, text in names.items()}
-        yield StateTrack(baseline, candidate, int(field.nothing), labels | {None: f"{field.name} becomes {{}}"})
+        yield StateTrack(baseline, candidate, int(field.nothing), labels | {None: f"{field.name} becomes {{}}"}, time)
         return
     highest = max(len(field.begins), int(baseline.max()), int(candidate.max()))
     for threshold in range(1, highest + 1):

@@ -94,11 +94,13 @@ def _asked(recording: Recording, signal: str) -> tuple[str, str]:
 
 
 def _poses(scene: Scene, recording: Recording, row: int) -> LinkPoses:
-    """Return the poses of a frame as the simulation has them: of the positions, not of rotations that were stored."""
+    """Return the poses of a frame as the simulation has them: of the positions, which guards may have held back, and of
+    the script of free bodies; not of rotations that were stored."""
     from replay.kinematics.motion import sample
 
-    states = sample(scene.linkage, scene.script, recording.time[row : row + 1] / SECOND)
-    return scene.linkage.forward(states.positions, states.free_poses)
+    at = slice(row, row + 1)
+    free = sample(scene.linkage, scene.script, recording.time[at] / SECOND).free_poses
+    return scene.linkage.forward(recording.joint_positions[at], free)
 
 
 def _sensor(moment: _Moment, kind: str, name: str, slow: bool) -> Iterator[str]:
@@ -179,8 +181,9 @@ def _by(moment: _Moment, kind: str, sensor: Any, method: str, fields: list[Field
         columns = suite.run(moment.poses)
     except (ReplayError, ValueError) as error:
         return f"cannot say: {str(error).splitlines()[0]}"
-    found = [float(np.asarray(getattr(columns, field.name))[0, 0]) for field in fields]
-    told = (quantities.shown(value, field.unit, digits=6) for value, field in zip(found, fields, strict=True))
+    there = [field for field in columns.present() if field in fields]  # the method, without what electronics make of it
+    found = [float(np.asarray(getattr(columns, field.name))[0, 0]) for field in there]
+    told = (quantities.shown(value, field.unit, digits=6) for value, field in zip(found, there, strict=True))
     return ", ".join("nothing" if np.isnan(value) else text for value, text in zip(found, told, strict=True))
 
 

@@ -121,8 +121,8 @@ class ExpectationCheck:
         outcomes = []
         for check in self._checks:
             if isinstance(check, _GuardCheck):
-                for text, path, passed, detail in judge(check.expected, stops):
-                    outcomes.append(Outcome(text, self._provenance.place((*check.path, *path)), passed, detail))
+                for text, path, passed, detail, measure in judge(check.expected, stops, check.path):
+                    outcomes.append(Outcome(text, self._provenance.place(path), passed, detail, measure))
                 continue
             passed, detail = check.state.result(check.what)
             measure = check.state.measure(dotted(check.path))

@@ -4,59 +4,81 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from replay.errors import count
 from replay.guarding.outcome import Stop
 from replay.guarding.part import BeforePart, GuardExpectation
+from replay.scenario.measures import Measure, finite
+from replay.scenario.source import dotted
 
-Judged = tuple[str, tuple[str, ...], bool, str]
-"""A line of an expectation as people read it, its path from the expectation on, whether it held, and what decided."""
+Path = tuple[str | int, ...]
 
 
-def judge(expected: GuardExpectation, stops: Sequence[Stop]) -> Iterator[Judged]:
+class Judged(NamedTuple):
+    """A line of an expectation as people read it, its path, whether it held, what decided, and that as a number."""
+
+    text: str
+    path: Path
+    passed: bool
+    detail: str
+    measure: Measure
+
+
+def judge(expected: GuardExpectation, stops: Sequence[Stop], place: Path) -> Iterator[Judged]:
     """Yield what became of each line of an expectation.
 
     Args:
         expected: as it is written.
         stops: of all guards, by time.
+        place: its path in the scenario.
     """
     name = expected.guard
     mine = [stop for stop in stops if stop.guard == name]
     if isinstance(expected.stops, BeforePart):
         before = expected.stops.before
         passed = bool(mine) and _rests(mine[0]) and mine[0].held is not None and mine[0].held <= before
-        yield f"{name}: stops before {before:.6g} s", ("stops",), passed, _told(mine)
+        path = (*place, "stops", "before")
+        held = mine[0].held if mine else None
+        margin = None if held is None else before - held
+        number = Measure(dotted(path), held, "s", held, name, before, margin)
+        yield Judged(f"{name}: stops before {before:.6g} s", path, passed, _told(mine), number)
     elif expected.stops is not None:
         passed = not mine if expected.stops == "never" else bool(mine) and all(map(_rests, mine))
-        yield f"{name}: stops {expected.stops}", ("stops",), passed, _told(mine)
+        path, triggers = (*place, "stops"), float(len(mine))
+        most, margin = (0.0, -triggers) if expected.stops == "never" else (None, None)
+        number = Measure(dotted(path), triggers, "", mine[0].trigger if mine else None, name, most, margin)
+        yield Judged(f"{name}: stops {expected.stops}", path, passed, _told(mine), number)
     if expected.stopping_distance is not None:
         most = expected.stopping_distance.max.value
-        ways = [(joint.stopping_distance, joint) for stop in mine for joint in stop.joints]
+        path = (*place, "stopping_distance", "max")
+        ways = [(joint.stopping_distance, joint, stop.held) for stop in mine for joint in stop.joints]
         late = [stop for stop in mine if stop.held is None]
-        detail = (
-            _told(mine)
-            if not ways
-            else "largest stopping distance {:.6g} {} of {}".format(
-                *max(((way, joint.unit, joint.joint) for way, joint in ways), key=lambda item: item[0])
-            )
-        )
-        passed = not late and all(way <= most for way, _ in ways)
-        detail += f", not at its end in {count(len(late), 'case')}" if late and ways else ""
-        yield f"{name}: stopping distance <= {most:.6g}", ("stopping_distance", "max"), passed, detail
+        detail, number = _told(mine), Measure(dotted(path), None, "", limit=most)
+        if ways:
+            way, joint, held = max(ways, key=lambda item: item[0])
+            detail = f"largest stopping distance {way:.6g} {joint.unit} of {joint.joint}"
+            detail += f", not at its end in {count(len(late), 'case')}" if late else ""
+            number = Measure(dotted(path), way, joint.unit, held, joint.joint, most, most - way)
+        passed = not late and all(way <= most for way, _, _ in ways)
+        yield Judged(f"{name}: stopping distance <= {most:.6g}", path, passed, detail, number)
     if expected.clearance_at_stop is not None:
         least = expected.clearance_at_stop.min
         nearest = [stop.clearance_at_stop for stop in mine]
         known = [value for value in nearest if value is not None]
         passed = len(known) == len(nearest) and all(value >= least for value in known)
-        detail = _told(mine)
+        path, detail = (*place, "clearance_at_stop", "min"), _told(mine)
+        number = Measure(dotted(path), None, "m", limit=least)
         if known:
             smallest = min(known)
+            held = next(stop.held for stop in mine if stop.clearance_at_stop == smallest)
+            number = Measure(dotted(path), finite(smallest), "m", held, name, least, finite(smallest - least))
             detail = "beyond the margin" if math.isinf(smallest) else f"smallest clearance {smallest:.6g} m"
         met = next((stop for stop in mine if stop.contact is not None), None)
         if met is not None:
             speeds = ", ".join(f"{joint} at {speed:.6g}/s" for joint, speed in met.contact_speed.items())
             detail += f", contact at {met.contact:.6g} s with {speeds}"
-        yield f"{name}: clearance at stop >= {least:.6g} m", ("clearance_at_stop", "min"), passed, detail
+        yield Judged(f"{name}: clearance at stop >= {least:.6g} m", path, passed, detail, number)
 
 
 def lines(stops: Sequence[Stop]) -> list[str]:

@@ -103,13 +103,20 @@ def test_an_effect_in_words(change, severity, text):
         assert str(effect) == text
 
 
+def test_a_category_changes_at_the_time_of_its_frame():
+    (found,) = told(triangle)
+    assert found.severity is Severity.BOOKKEEPING
+    assert found.text.endswith(", at 0.333333 s"), "frame 20 at 60 Hz"
+    assert found.at == pytest.approx(20 / 60, abs=1e-9)
+
+
 def test_the_worst_comes_first_and_each_thing_counts_once():
     found = told(triangle, later, new, nearer, output, undetected, moves)
     assert [effect.severity for effect in found] == sorted(effect.severity for effect in found)
     subjects = [effect.subject for effect in found]
     assert subjects[:2] == ["arm/beam | stand/column", "arm/beam | stand/base"]
     assert len(found) == 6, "one for each pair, each sensor, and the motion"
-    assert headline(found).endswith("arm/beam | stand/column; 5 more readings")
+    assert headline(found).endswith("arm/beam | stand/column; 4 more readings"), "a triangle is no reading"
 
 
 def test_what_is_larger_in_tolerances_comes_first():

@@ -36,7 +36,7 @@ def test_text_is_short_and_says_where_and_how_much():
     lines = text(found).splitlines()
     assert lines == [
         "different: made_up: 1 change of the scene, 6 of 55 signals changed, 1 difference of provenance",
-        "  worst: contact 33.3 ms later: arm/beam | stand/base; 4 more readings",
+        "  worst: contact 33.3 ms later: arm/beam | stand/base; 3 more readings",
         "  provenance (does not decide)",
         f"    libraries.numpy: {np.__version__} -> 9.9",
         "  scene",
