@@ -10,11 +10,11 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from replay.comparison import quantities
+from replay.language.node import KeyPath
 from replay.language.units import AnyQuantity, Dimensioned, Quantity
 from replay.scenario.model import Scenario
 from replay.scenario.source import dotted
 
-Path = tuple[str | int, ...]
 _SILENT = ("version", "name", "description", "tags", "sweep", "include", "model")
 """Keys of a scenario that change no result, or that the recording's metadata tell better."""
 _LONG = 60
@@ -27,14 +27,14 @@ def input_changes(baseline: Scenario, candidate: Scenario) -> Iterator[str]:
             yield from _model_field(baseline, candidate, name, ())
 
 
-def _model_field(a: BaseModel, b: BaseModel, name: str, path: Path) -> Iterator[str]:
+def _model_field(a: BaseModel, b: BaseModel, name: str, path: KeyPath) -> Iterator[str]:
     info = type(b).model_fields[name]
     key = info.alias or name
     unit = _unit(info.metadata) or _unit(get_args(info.annotation)) or _unit([info.annotation])
     yield from _changes(getattr(a, name), getattr(b, name), (*path, key), unit)
 
 
-def _changes(a: Any, b: Any, path: Path, unit: str) -> Iterator[str]:
+def _changes(a: Any, b: Any, path: KeyPath, unit: str) -> Iterator[str]:
     """Yield the changes at a path and below; `unit` is that of numbers there, where their type says it."""
     if isinstance(a, BaseModel) and isinstance(b, BaseModel):
         kinds = getattr(a, "type", None), getattr(b, "type", None)
@@ -93,7 +93,7 @@ def _text(value: Any, instead: Any = None) -> str:
     return text if len(text) <= _LONG else f"{text[:_LONG]}..."
 
 
-def _place(path: Path) -> str:
+def _place(path: KeyPath) -> str:
     """Return "person/body radius" of a shape's key, else the path of the YAML key."""
     if len(path) > 3 and path[0] == "links" and path[2] == "shapes":
         below = dotted(path[4:])

@@ -20,6 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from replay.language.node import KeyPath
 from replay.language.units import Angle, Length, Number, Size
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
@@ -37,7 +38,7 @@ def with_keys(base: type[Part], **keys: tuple[Any, Any]) -> Any:
     return create_model(name, __base__=base, __module__=base.__module__, __doc__=base.__doc__, **keys)  # type: ignore[call-overload]
 
 
-def rejected(rule: str, at: tuple[str | int, ...] = ()) -> PydanticCustomError:
+def rejected(rule: str, at: KeyPath = ()) -> PydanticCustomError:
     """Return the error to raise when a value breaks a rule; `at` leads from the validated value to the culprit."""
     return PydanticCustomError("rule", "{rule}", {"rule": rule, "at": list(at)})
 

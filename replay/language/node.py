@@ -9,6 +9,9 @@ from replay.errors import Problem
 
 Scalar = str | int | float | bool | None
 
+KeyPath = tuple[str | int, ...]
+"""The keys and the places in sequences that lead from a document's root to a value."""
+
 
 @dataclass(frozen=True, slots=True)
 class Place:

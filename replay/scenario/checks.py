@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from replay.language.node import KeyPath
 from replay.language.units import (
     ACCELERATION,
     ANGLE,
@@ -18,7 +19,7 @@ from replay.scenario.expectations import PairExpectation
 from replay.scenario.guard_checks import guard_findings
 from replay.scenario.names import SCALAR_JOINTS, JointName, Names
 from replay.scenario.pair_checks import known_clearance, matching_patterns, tested_pairs
-from replay.scenario.problems import Finding, Path, did_you_mean
+from replay.scenario.problems import Finding, did_you_mean
 from replay.sensing.kinds import KINDS
 from replay.sensing.signal.part import sampling_problems
 
@@ -60,7 +61,7 @@ def _mimics(names: Names) -> Iterator[Finding]:
     for name, mimic in follows.items():
         if mimic is None:
             continue
-        path: Path = ("links", joints[name].link, "joint", "mimic")
+        path: KeyPath = ("links", joints[name].link, "joint", "mimic")
         if mimic.joint in joints and joints[mimic.joint].type == "free":
             yield (*path, "joint"), "is a free joint, which has no position that could be followed"
         else:
@@ -99,7 +100,7 @@ def _circles(parents: dict[str, str | None]) -> Iterator[Finding]:
 def _motion(names: Names) -> Iterator[Finding]:
     joints = {joint.name: joint for joint in names.joints if joint.type != "fixed"}
     for name, waypoints in names.points.items():
-        path: Path = ("motion", "points", name)
+        path: KeyPath = ("motion", "points", name)
         yield from _moved_joint(path, joints, name)
         joint = joints.get(name)
         for index, point in enumerate(waypoints or ()):
@@ -142,7 +143,7 @@ def _motion(names: Names) -> Iterator[Finding]:
             )
 
 
-def _in_a_move(path: Path, joints: dict[str, JointName], names: Names, name: str, subject: str) -> Iterator[Finding]:
+def _in_a_move(path: KeyPath, joints: dict[str, JointName], names: Names, name: str, subject: str) -> Iterator[Finding]:
     """Find what keeps a joint from being moved by a move; `subject` goes before what is said of it."""
     if name in joints:
         yield from _has_limits(path, joints[name], subject)
@@ -150,7 +151,7 @@ def _in_a_move(path: Path, joints: dict[str, JointName], names: Names, name: str
         yield path, f"{subject}is a joint that motion.points moves as well; keep one of the two"
 
 
-def _moved_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
+def _moved_joint(path: KeyPath, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
     yield from _scalar_joint(path, joints, name)
     joint = joints.get(name)
     if joint is not None and joint.scalar is not None and joint.scalar.mimic is not None:
@@ -158,7 +159,7 @@ def _moved_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterato
         yield path, f"is a joint that follows {leader!r}, which alone moves it; name the joint that leads"
 
 
-def _scalar_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
+def _scalar_joint(path: KeyPath, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
     scalar = [joint.name for joint in joints.values() if joint.type in SCALAR_JOINTS]
     if name not in joints:
         yield path, f"is no joint that moves; {did_you_mean(name, scalar, what='joints are')}"
@@ -166,7 +167,7 @@ def _scalar_joint(path: Path, joints: dict[str, JointName], name: str) -> Iterat
         yield path, "is a free joint; move it by key frames in motion.free"
 
 
-def _position(path: Path, position: Dimensioned, joint: JointName) -> Iterator[Finding]:
+def _position(path: KeyPath, position: Dimensioned, joint: JointName) -> Iterator[Finding]:
     if joint.type not in SCALAR_JOINTS:
         return
     expected = _dimension(joint)
@@ -181,7 +182,7 @@ def _position(path: Path, position: Dimensioned, joint: JointName) -> Iterator[F
             yield path, f"is below the lower limit {lower:.6g} {expected.si} of joint {joint.name!r}"
 
 
-def _rate(path: Path, rate: Dimensioned | None, joint: JointName, limit: str) -> Iterator[Finding]:
+def _rate(path: KeyPath, rate: Dimensioned | None, joint: JointName, limit: str) -> Iterator[Finding]:
     if rate is None or joint.type not in SCALAR_JOINTS:
         return
     linear, angular = (VELOCITY, ANGULAR_VELOCITY) if limit == "velocity" else (ACCELERATION, ANGULAR_ACCELERATION)
@@ -206,7 +207,7 @@ def _wrong_dimension(value: Dimensioned, expected: Dimension, joint: JointName) 
     return f"is {value.dimension.name} where {expected.name} belongs ({moves}); {expected.what_works}"
 
 
-def _has_limits(path: Path, joint: JointName, subject: str) -> Iterator[Finding]:
+def _has_limits(path: KeyPath, joint: JointName, subject: str) -> Iterator[Finding]:
     if joint.scalar is None or joint.scalar.mimic is not None:
         return
     missing = [limit for limit in ("velocity", "acceleration") if getattr(joint.scalar, limit) == float("inf")]
@@ -220,7 +221,7 @@ def _sensors(names: Names) -> Iterator[Finding]:
         for name, sensor in sensors.items():
             if sensor is None:
                 continue
-            path: Path = ("sensors", kind, name)
+            path: KeyPath = ("sensors", kind, name)
             if sensor.link not in names.parents:
                 rule = did_you_mean(sensor.link, names.parents, what="links are")
                 yield (*path, "link"), f"is no link; {rule}"
@@ -242,7 +243,7 @@ def _disabled(names: Names) -> Iterator[Finding]:
     for index, entry in enumerate(names.disable):
         if entry is None:
             continue
-        path: Path = ("collision", "disable", index, "pair")
+        path: KeyPath = ("collision", "disable", index, "pair")
         found = list(matching_patterns(names, path, entry.pair))
         yield from found
         sides = [names.shapes_matching(pattern) for pattern in entry.pair]
@@ -252,7 +253,7 @@ def _disabled(names: Names) -> Iterator[Finding]:
 
 def _expectations(names: Names) -> Iterator[Finding]:
     for index, expected in enumerate(names.expect):
-        path: Path = ("expect", index)
+        path: KeyPath = ("expect", index)
         if isinstance(expected, PairExpectation):
             found = list(matching_patterns(names, (*path, "pair"), expected.pair))
             yield from found or tested_pairs(names, (*path, "pair"), expected.pair)

@@ -14,7 +14,7 @@ from replay.collision.columns import CollisionColumns, Level
 from replay.guarding.outcome import Stop
 from replay.guarding.part import GuardExpectation
 from replay.language.fields import Part
-from replay.language.node import Place
+from replay.language.node import KeyPath, Place
 from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.guard_outcomes import judge
@@ -58,7 +58,7 @@ class _Check:
     """One line of an expectation: what is taken from each block, and what is kept of it."""
 
     text: str
-    path: tuple[str | int, ...]
+    path: KeyPath
     what: str
     take: Callable[[_Block], Any]
     state: Tally
@@ -68,7 +68,7 @@ class _Check:
 class _GuardCheck:
     """An expectation of a guard, judged in the end."""
 
-    path: tuple[str | int, ...]
+    path: KeyPath
     expected: GuardExpectation
 
 
@@ -129,7 +129,7 @@ class ExpectationCheck:
             outcomes.append(Outcome(check.text, self._provenance.place(check.path), passed, detail, measure))
         return outcomes
 
-    def _add_pairs(self, path: tuple[str | int, ...], expected: PairExpectation) -> None:
+    def _add_pairs(self, path: KeyPath, expected: PairExpectation) -> None:
         columns = matching_pairs(self._layout.pairs, expected.pair)
         about = " | ".join(expected.pair)
         names = [self._layout.pairs[k].replace("|", " | ") for k in columns.tolist()]
@@ -180,7 +180,7 @@ class ExpectationCheck:
             text = f"{about}: clearance >= {least:.6g} m"
             self._checks.append(_Check(text, (*path, "clearance"), "clearance", clearance, tally))
 
-    def _add_reading(self, path: tuple[str | int, ...], kind: str, written: Any, expected: Expected) -> None:
+    def _add_reading(self, path: KeyPath, kind: str, written: Any, expected: Expected) -> None:
         name = getattr(written, kind)
         column = self._layout.sensors[kind].index(name)
         asked = getattr(written, expected.what) if expected.inside else written
@@ -189,7 +189,7 @@ class ExpectationCheck:
         def take(block: _Block) -> Floats:
             return expected.values(block.readings[kind])[:, column].astype(np.float64)
 
-        def add(text: str, where: tuple[str | int, ...], state: Tally) -> None:
+        def add(text: str, where: KeyPath, state: Tally) -> None:
             self._checks.append(_Check(f"{name}: {expected.what} {text}", where, expected.what, take, state))
 
         if expected.unit:

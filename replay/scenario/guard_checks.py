@@ -15,6 +15,7 @@ from replay.guarding.part import (
     SeparationCondition,
 )
 from replay.language.fields import Part
+from replay.language.node import KeyPath
 from replay.language.units import (
     ACCELERATION,
     ANGLE,
@@ -24,7 +25,7 @@ from replay.language.units import (
 )
 from replay.scenario.names import SCALAR_JOINTS, JointName, Names
 from replay.scenario.pair_checks import known_clearance, matching_patterns, tested_pairs
-from replay.scenario.problems import Finding, Path, did_you_mean
+from replay.scenario.problems import Finding, did_you_mean
 from replay.sensing.kinds import KINDS
 
 
@@ -34,8 +35,8 @@ def guard_findings(names: Names) -> Iterator[Finding]:
     for name, guard in names.guards.items():
         if guard is None:
             continue
-        path: Path = ("guards", name)
-        where: Path = ("stop",) if guard.stop is not None else ("slow", "joints")
+        path: KeyPath = ("guards", name)
+        where: KeyPath = ("stop",) if guard.stop is not None else ("slow", "joints")
         for index, joint in enumerate(guard.joints):
             here = (*path, *where, index)
             yield from _slowed(here, joints, joint)
@@ -60,7 +61,7 @@ def guard_findings(names: Names) -> Iterator[Finding]:
             yield from _expected(names, ("expect", index), expected, joints)
 
 
-def _slowed(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
+def _slowed(path: KeyPath, joints: dict[str, JointName], name: str) -> Iterator[Finding]:
     scalar = [joint.name for joint in joints.values() if joint.type in SCALAR_JOINTS]
     joint = joints.get(name)
     if joint is None:
@@ -72,7 +73,7 @@ def _slowed(path: Path, joints: dict[str, JointName], name: str) -> Iterator[Fin
         yield path, f"is a joint that follows {leader!r} and its clock; name the joint that leads"
 
 
-def _brakes(path: Path, joint: JointName) -> Iterator[Finding]:
+def _brakes(path: KeyPath, joint: JointName) -> Iterator[Finding]:
     if joint.scalar is None or joint.scalar.mimic is not None:
         return
     limit = joint.scalar.acceleration if joint.scalar.deceleration is None else joint.scalar.deceleration
@@ -81,7 +82,7 @@ def _brakes(path: Path, joint: JointName) -> Iterator[Finding]:
         yield path, f"{rule}; give it one, or the guard a deceleration: {{{joint.name}: ...}}"
 
 
-def _condition(names: Names, path: Path, when: Part, dimensions: set[Dimension]) -> Iterator[Finding]:
+def _condition(names: Names, path: KeyPath, when: Part, dimensions: set[Dimension]) -> Iterator[Finding]:
     """Find what is wrong with a condition; the dimensions of its thresholds are added to `dimensions`."""
     if isinstance(when, AnyCondition | AllCondition):
         key = "any" if isinstance(when, AnyCondition) else "all"
@@ -116,7 +117,7 @@ def _senses(names: Names, sensor: Part) -> bool:
     return any(shape.link != getattr(sensor, "link", None) and shape.link not in ignored for shape in names.shapes)
 
 
-def _hysteresis(path: Path, guard: GuardPart, dimensions: set[Dimension]) -> Iterator[Finding]:
+def _hysteresis(path: KeyPath, guard: GuardPart, dimensions: set[Dimension]) -> Iterator[Finding]:
     release = guard.release
     if not isinstance(release, ReleasePart) or release.hysteresis is None:
         return
@@ -133,7 +134,9 @@ def _hysteresis(path: Path, guard: GuardPart, dimensions: set[Dimension]) -> Ite
         yield here, f"{rule}, as in the condition; {wanted.what_works}"
 
 
-def _expected(names: Names, path: Path, expected: GuardExpectation, joints: dict[str, JointName]) -> Iterator[Finding]:
+def _expected(
+    names: Names, path: KeyPath, expected: GuardExpectation, joints: dict[str, JointName]
+) -> Iterator[Finding]:
     if expected.guard not in names.guards:
         yield (*path, "guard"), f"is no guard; {did_you_mean(expected.guard, names.guards, what='guards are')}"
         return

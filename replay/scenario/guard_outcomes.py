@@ -9,23 +9,22 @@ from typing import NamedTuple
 from replay.errors import count
 from replay.guarding.outcome import Stop
 from replay.guarding.part import BeforePart, GuardExpectation
+from replay.language.node import KeyPath
 from replay.scenario.measures import Measure, finite
 from replay.scenario.source import dotted
 
-Path = tuple[str | int, ...]
 
-
-class Judged(NamedTuple):
+class GuardJudgement(NamedTuple):
     """A line of an expectation as people read it, its path, whether it held, what decided, and that as a number."""
 
     text: str
-    path: Path
+    path: KeyPath
     passed: bool
     detail: str
     measure: Measure
 
 
-def judge(expected: GuardExpectation, stops: Sequence[Stop], place: Path) -> Iterator[Judged]:
+def judge(expected: GuardExpectation, stops: Sequence[Stop], place: KeyPath) -> Iterator[GuardJudgement]:
     """Yield what became of each line of an expectation.
 
     Args:
@@ -42,13 +41,13 @@ def judge(expected: GuardExpectation, stops: Sequence[Stop], place: Path) -> Ite
         held = mine[0].held if mine else None
         margin = None if held is None else before - held
         number = Measure(dotted(path), held, "s", held, name, before, margin)
-        yield Judged(f"{name}: stops before {before:.6g} s", path, passed, _told(mine), number)
+        yield GuardJudgement(f"{name}: stops before {before:.6g} s", path, passed, _told(mine), number)
     elif expected.stops is not None:
         passed = not mine if expected.stops == "never" else bool(mine) and all(map(_rests, mine))
         path, triggers = (*place, "stops"), float(len(mine))
         most, margin = (0.0, -triggers) if expected.stops == "never" else (None, None)
         number = Measure(dotted(path), triggers, "", mine[0].trigger if mine else None, name, most, margin)
-        yield Judged(f"{name}: stops {expected.stops}", path, passed, _told(mine), number)
+        yield GuardJudgement(f"{name}: stops {expected.stops}", path, passed, _told(mine), number)
     if expected.stopping_distance is not None:
         most = expected.stopping_distance.max.value
         path = (*place, "stopping_distance", "max")
@@ -61,7 +60,7 @@ def judge(expected: GuardExpectation, stops: Sequence[Stop], place: Path) -> Ite
             detail += f", not at its end in {count(len(late), 'case')}" if late else ""
             number = Measure(dotted(path), way, joint.unit, held, joint.joint, most, most - way)
         passed = not late and all(way <= most for way, _, _ in ways)
-        yield Judged(f"{name}: stopping distance <= {most:.6g}", path, passed, detail, number)
+        yield GuardJudgement(f"{name}: stopping distance <= {most:.6g}", path, passed, detail, number)
     if expected.clearance_at_stop is not None:
         least = expected.clearance_at_stop.min
         nearest = [stop.clearance_at_stop for stop in mine]
@@ -78,7 +77,7 @@ def judge(expected: GuardExpectation, stops: Sequence[Stop], place: Path) -> Ite
         if met is not None:
             speeds = ", ".join(f"{joint} at {speed:.6g}/s" for joint, speed in met.contact_speed.items())
             detail += f", contact at {met.contact:.6g} s with {speeds}"
-        yield Judged(f"{name}: clearance at stop >= {least:.6g} m", path, passed, detail, number)
+        yield GuardJudgement(f"{name}: clearance at stop >= {least:.6g} m", path, passed, detail, number)
 
 
 def lines(stops: Sequence[Stop]) -> list[str]:

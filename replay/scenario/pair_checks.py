@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from replay.language.node import KeyPath
 from replay.scenario.names import Names, ShapeName
-from replay.scenario.problems import Finding, Path, did_you_mean
+from replay.scenario.problems import Finding, did_you_mean
 
 
-def matching_patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
+def matching_patterns(names: Names, path: KeyPath, pair: tuple[str, str]) -> Iterator[Finding]:
     """Find patterns that match nothing."""
     for side, pattern in enumerate(pair):
         if not names.links_matching(pattern) and not names.shapes_matching(pattern):
@@ -16,7 +17,7 @@ def matching_patterns(names: Names, path: Path, pair: tuple[str, str]) -> Iterat
             yield (*path, side), f"matches no link and no shape; {did_you_mean(pattern, known)}"
 
 
-def tested_pairs(names: Names, path: Path, pair: tuple[str, str]) -> Iterator[Finding]:
+def tested_pairs(names: Names, path: KeyPath, pair: tuple[str, str]) -> Iterator[Finding]:
     """Find that two patterns match no pair of shapes that is tested, and why."""
     if not names.tests_pairs:
         yield path, f"{list(pair)}: nothing is tested, since collision.pairs is none"
@@ -45,7 +46,7 @@ def _hindrance(names: Names, a: ShapeName, b: ShapeName) -> str | None:
     return None
 
 
-def known_clearance(names: Names, path: Path, least: float) -> Iterator[Finding]:
+def known_clearance(names: Names, path: KeyPath, least: float) -> Iterator[Finding]:
     """Find that a clearance is not computed as far as it is asked for."""
     if names.model is None or names.margin is None:
         return

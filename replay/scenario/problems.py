@@ -16,13 +16,12 @@ from replay.errors import Problem
 from replay.guarding.part import CONDITIONS, condition_key
 from replay.language import decimal_comma
 from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
-from replay.language.node import Node
+from replay.language.node import KeyPath, Node
 from replay.scenario.expectations import PARTS
 from replay.scenario.shapes import MESH_FILE_RULE, Color, MeshFile
 from replay.scenario.source import dotted, find, locate, problem_at
 
-Path = tuple[str | int, ...]
-Finding = tuple[Path, str]
+Finding = tuple[KeyPath, str]
 """The path of a value, and the rule it breaks."""
 
 _LIKELY, _LONG = 500, 200
@@ -173,7 +172,7 @@ class _Location:
         entries: how many entries the value has, where it is a list of so many.
     """
 
-    path: Path
+    path: KeyPath
     owner: type[BaseModel] | None = None
     length: int | None = None
     on_key: bool = False

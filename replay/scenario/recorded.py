@@ -13,6 +13,7 @@ import numpy as np
 
 from replay.errors import Problem, RecordingError, count
 from replay.kinematics.motion import FreeTrack, Track
+from replay.language.node import KeyPath
 from replay.language.units import ANGLE, LENGTH, TIME
 from replay.logs.csv_table import Format, is_excerpt, unit_of
 from replay.logs.exported import ENDINGS, as_csv
@@ -234,7 +235,7 @@ class _MotionReader:
         return Track(seconds, position, self._tolerance(path, joint, mine[joint], position))
 
     def _positions(
-        self, path: tuple[str | int, ...], kind: str, source: RecordedJointPart, log: JointLog, window: Window
+        self, path: KeyPath, kind: str, source: RecordedJointPart, log: JointLog, window: Window
     ) -> tuple[Floats, Floats]:
         """Return times (n,) [s] and positions (n,) [rad or m] that the log has of a joint of a kind."""
         dimension = LENGTH if kind == "prismatic" else ANGLE
@@ -262,7 +263,7 @@ class _MotionReader:
         for rule in deviations(joints, self._linkage.followers, self._found.tracks, log, read):
             self._note(path, rule)
 
-    def _note_jumps(self, path: tuple[str | int, ...], seconds: np.ndarray, position: np.ndarray) -> None:
+    def _note_jumps(self, path: KeyPath, seconds: np.ndarray, position: np.ndarray) -> None:
         jumps = np.flatnonzero(np.abs(np.diff(position)) > math.pi)
         if len(jumps):
             step = float(position[jumps[0] + 1] - position[jumps[0]])
@@ -270,7 +271,7 @@ class _MotionReader:
             rule = f"jumps by {step:.4g} rad between two samples at {seconds[jumps[0]]:.6g} s{more}"
             self._note(path, f"{rule}; if its encoder wraps there, the joint is of type continuous")
 
-    def _tolerance(self, path: tuple[str | int, ...], joint: str, kind: str, position: np.ndarray) -> float:
+    def _tolerance(self, path: KeyPath, joint: str, kind: str, position: np.ndarray) -> float:
         """Return how far a joint may be beyond its limits [rad or m], and note where it is."""
         dimension = LENGTH if kind == "prismatic" else ANGLE
         written = self._written.limit_tolerance
@@ -299,7 +300,7 @@ class _MotionReader:
     def _wrong(self, error: Unusable) -> None:
         self._found.problems.append(self._scenario.provenance.problem(error.path, error.rule))
 
-    def _note(self, path: tuple[str | int, ...], rule: str) -> None:
+    def _note(self, path: KeyPath, rule: str) -> None:
         self._found.notes.append(self._scenario.provenance.problem(path, rule))
 
 

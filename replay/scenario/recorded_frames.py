@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from replay.kinematics.motion import FreePath, FreeTrack
+from replay.language.node import KeyPath
 from replay.logs.joint_log import Frame, Series
 from replay.numerics import transforms
 from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window
@@ -16,7 +17,7 @@ UNIT = 1e-3
 
 
 def pose_track(
-    path: tuple[str | int, ...], frames: Mapping[Frame, Series], child: str, parent: str, window: Window
+    path: KeyPath, frames: Mapping[Frame, Series], child: str, parent: str, window: Window
 ) -> tuple[FreeTrack, list[int]]:
     """Return the poses of one frame in another and the rows of the log that they come from.
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from replay.language.node import KeyPath
 from replay.logs.joint_log import Publisher, Series
 from replay.numerics.arrays import Flags, Floats, Integers
 
@@ -23,7 +24,7 @@ OFTEN = 2 * 10**8
 class Unusable(Exception):
     """A part of the recorded motion cannot be used: the path of the language, and the rule that is broken."""
 
-    def __init__(self, path: tuple[str | int, ...], rule: str) -> None:
+    def __init__(self, path: KeyPath, rule: str) -> None:
         self.path = path
         self.rule = rule
         super().__init__(rule)
@@ -56,7 +57,7 @@ class Window:
         return f"{(int(time) - self.log_begin) / 1e9:.9g} s"
 
 
-def in_window(path: tuple[str | int, ...], series: Series, window: Window) -> Series:
+def in_window(path: KeyPath, series: Series, window: Window) -> Series:
     """Return the samples of the scenario's time and one on either side of it.
 
     Raises:
@@ -95,7 +96,7 @@ def in_window(path: tuple[str | int, ...], series: Series, window: Window) -> Se
 _WAY_OUT = "channel and frame_id do not tell them apart: record one alone, or each on a topic of its own"
 
 
-def check_turns(path: tuple[str | int, ...], time: Integers, value: Floats) -> None:
+def check_turns(path: KeyPath, time: Integers, value: Floats) -> None:
     """Refuse samples that two publishers give in turn: two smooth motions, apart from each other.
 
     Where one publisher's sample stands between two of the other's, it is off the line between them by far more than

@@ -11,6 +11,7 @@ from replay.errors import InvalidValue, MotionLimitError, Problem
 from replay.kinematics.linkage import Joint, JointType, Link, Linkage, Mimic
 from replay.kinematics.motion import Keyframe, Move, Script, check_limits, joint_profiles
 from replay.kinematics.profiles import Waypoint
+from replay.language.node import KeyPath
 from replay.language.units import Dimensioned
 from replay.numerics import transforms
 from replay.scenario import links
@@ -78,7 +79,7 @@ def motion_problems(scenario: Scenario) -> Iterator[Problem]:
             yield scenario.provenance.problem(_where(scenario, leader, error.time), rule)
 
 
-def _where(scenario: Scenario, joint: str, time: float) -> tuple[str | int, ...]:
+def _where(scenario: Scenario, joint: str, time: float) -> KeyPath:
     """Return the path of the entry that moves a joint at a time."""
     points = scenario.motion.points.get(joint)
     if joint in scenario.provenance.tracks:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from replay import limits
 from replay.errors import Problem
-from replay.language.node import Node, Place
+from replay.language.node import KeyPath, Node, Place
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 
 if TYPE_CHECKING:
@@ -75,18 +75,18 @@ class ScenarioProvenance:
         """The SHA-256 of each source, in hexadecimal."""
         return {name: hashlib.sha256(data).hexdigest() for name, data in sorted(self.sources.items())}
 
-    def place(self, path: tuple[str | int, ...]) -> Place | None:
+    def place(self, path: KeyPath) -> Place | None:
         """Return where a path of the language is written; None for a scenario that was not read from text."""
         return None if self.root is None else locate(self.root, path)
 
-    def problem(self, path: tuple[str | int, ...], rule: str) -> Problem:
+    def problem(self, path: KeyPath, rule: str) -> Problem:
         """Return what is wrong with the value at a path, with its place."""
         if self.root is None:
             return Problem(f"{dotted(path)} {rule}")
         return problem_at(self.root, path, rule)
 
 
-def locate(root: Node, path: tuple[str | int, ...]) -> Place:
+def locate(root: Node, path: KeyPath) -> Place:
     """Return where the value at a path is written: a scalar itself, a collection's key; or what comes nearest above."""
     node, place = root, root.place
     for step in path:
@@ -99,7 +99,7 @@ def locate(root: Node, path: tuple[str | int, ...]) -> Place:
     return place
 
 
-def find(root: Node, path: tuple[str | int, ...]) -> Node | None:
+def find(root: Node, path: KeyPath) -> Node | None:
     """Return the node at a path, or None."""
     node: Node | None = root
     for step in path:
@@ -107,7 +107,7 @@ def find(root: Node, path: tuple[str | int, ...]) -> Node | None:
     return node
 
 
-def problem_at(root: Node, path: tuple[str | int, ...], rule: str, *, kind: bool = False) -> Problem:
+def problem_at(root: Node, path: KeyPath, rule: str, *, kind: bool = False) -> Problem:
     """Return `path = value rule` with its place; of a collection its kind, where that is what is wrong."""
     node = find(root, path)
     value = ""
@@ -119,7 +119,7 @@ def problem_at(root: Node, path: tuple[str | int, ...], rule: str, *, kind: bool
     return locate(root, path).problem(f"{name}{value} {rule}" if name else rule)
 
 
-def dotted(path: tuple[str | int, ...]) -> str:
+def dotted(path: KeyPath) -> str:
     """Return a path as people write it: `links.arm.shapes.box.size[2]`."""
     text = ""
     for step in path:

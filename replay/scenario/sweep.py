@@ -15,7 +15,7 @@ from pydantic import Discriminator, Field, StrictInt, StringConstraints, Tag, mo
 from replay import limits
 from replay.errors import Problem, ScenarioError
 from replay.language.fields import Part, rejected
-from replay.language.node import Node, Place
+from replay.language.node import KeyPath, Node, Place
 from replay.scenario.source import dotted
 from replay.sensing.kinds import KINDS
 
@@ -34,8 +34,6 @@ _MAY_BE_LEFT_OUT: Final = {
     *(("model", kind) for kind in KINDS),
 }
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.,+=\-]+")
-
-Path = tuple[str | int, ...]
 
 
 class CountPart(Part):
@@ -190,7 +188,7 @@ def _safe(text: str) -> str:
     return _UNSAFE.sub("_", text.replace(" ", "").replace("[", "").replace("]", ""))
 
 
-def _resolve(root: Node, written: str) -> Path | str:
+def _resolve(root: Node, written: str) -> KeyPath | str:
     """Return the path that a text stands for, or the rule that it breaks; names may hold dots, so the longest wins."""
     from replay.scenario.problems import did_you_mean
 
@@ -221,7 +219,7 @@ def _resolve(root: Node, written: str) -> Path | str:
     return tuple(path)
 
 
-def _with(node: Node, path: Path, value: Node) -> Node:
+def _with(node: Node, path: KeyPath, value: Node) -> Node:
     """Return a tree in which the value at a path is another one."""
     if not path:
         return value

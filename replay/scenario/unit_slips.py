@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from replay.errors import Problem
+from replay.language.node import KeyPath
 from replay.numerics.constants import FULL_TURN
 from replay.scenario.source import find
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
-
-Path = tuple[str | int, ...]
 
 
 def beyond_a_turn(scenario: Scenario) -> Iterator[Problem]:
@@ -27,7 +26,7 @@ def beyond_a_turn(scenario: Scenario) -> Iterator[Problem]:
             yield scenario.provenance.problem(path, rule)
 
 
-def _angles(scenario: Scenario) -> Iterator[tuple[Path, float]]:
+def _angles(scenario: Scenario) -> Iterator[tuple[KeyPath, float]]:
     turning = {}
     for name, link in scenario.links.items():
         if link.joint.type in ("revolute", "continuous"):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from numpy.typing import NDArray
 
 from replay.language.fields import Part, rejected
+from replay.language.node import KeyPath
 from replay.language.units import Dimension
 from replay.numerics.arrays import Flags, Floats
 from replay.numerics.columns import Columns
@@ -188,7 +189,7 @@ class SensorKind(ABC):
     def sensor(self, name: str, part: Any, link: int, ignored_links: frozenset[int]) -> Any:
         """Return a sensor of how it is written, on a link by its index; it has a `name` and a `link`."""
 
-    def own_shapes(self, part: Any) -> Mapping[tuple[str | int, ...], str]:
+    def own_shapes(self, part: Any) -> Mapping[KeyPath, str]:
         """Return the shapes of its own link that a sensor as it is written names, by where it does."""
         return {}
 

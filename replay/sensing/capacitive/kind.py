@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from replay.language.node import KeyPath
 from replay.language.units import VOLTAGE
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
@@ -74,7 +75,7 @@ class Capacitive(SensorKind):
         same = part.model_dump(exclude={"link", "plates", "back", "ignore", "signal"})
         return CapacitiveSensor(name=name, link=link, plates=plates, **same, ignored_links=ignored_links)
 
-    def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[tuple[str | int, ...], str]:
+    def own_shapes(self, part: CapacitiveSensorPart) -> Mapping[KeyPath, str]:
         """See `SensorKind`: what is behind the plates."""
         return {("back", index): name for index, name in enumerate(part.back)}
 
