@@ -110,6 +110,9 @@ def signal(item: SignalDifference, total: int, *, events: int | None = SHOWN_EVE
         within = "" if item.outside == item.frames else f", {item.outside} outside the tolerance"
         lines.append(f"{item.frames} of {count(total, 'frame')} differ{within}; first {moment(item.first)}")
         lines.extend(_worst(item))
+        if item.rms is not None:
+            above = ", more than the rule accepts" if item.spread else ""
+            lines.append(f"root mean square {number(item.rms, item.signal.unit)}{above}")
         if item.nan:
             lines.append(f"{count(item.nan, 'frame')} with NaN in place of a number, or the reverse")
         if item.infinite:
@@ -151,6 +154,7 @@ def tolerance(item: Rule) -> str:
     default, given = EXACT, item.tolerance
     parts = ["ignored"] if given.ignore else []
     parts += [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
+    parts += [f"rms {given.rms:g}"] if given.rms is not None else []
     parts += [f"time {seconds(given.time)}"] if given.time else []
     parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
     parts += [f"bracket {seconds(given.bracket)}"] if given.bracket is not None else []
