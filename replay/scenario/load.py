@@ -271,7 +271,7 @@ def _read_measured(
     if name is None or scenario.measured is None:
         return
     same = recorded[1] if recorded is not None and recorded[0] == name else None
-    found = read(scenario, scenario.measured, library, name, same)
+    found = read(scenario, scenario.measured, library, name, provenance.problem, same)
     provenance.log_notes.extend(found.notes)
     problems.extend(found.problems)
     if not found.problems:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -79,7 +79,12 @@ class MeasuredLog:
 
 
 def read(
-    scenario: Scenario, written: MeasuredMapPart, library: Library, name: str, recorded: RecordedMotion | None = None
+    scenario: Scenario,
+    written: MeasuredMapPart,
+    library: Library,
+    name: str,
+    problem: Callable[[KeyPath, str], Problem],
+    recorded: RecordedMotion | None = None,
 ) -> MeasuredLog:
     """Return what a log says of a scenario's signals.
 
@@ -88,6 +93,7 @@ def read(
         written: which channels measure which of them.
         library: where files are.
         name: of the log in the library: a file, or a ROS 2 bag's folder.
+        problem: returns that a rule is broken at a path of the language, with its place.
         recorded: what the same log says of the scenario's motion, if it moves the scenario too.
     """
     found = MeasuredLog()
@@ -96,11 +102,11 @@ def read(
         file = _opened(written, library, name)
         log = _read(written, file, set(places.values()), recorded)
     except Unusable as error:
-        found.problems.append(scenario.provenance.problem(error.path, error.rule))
+        found.problems.append(problem(error.path, error.rule))
         return found
     if log.left_out:
         rule = f"begins with {count(log.left_out, 'sample')} stamped 0, before its clock was there; left out"
-        found.notes.append(scenario.provenance.problem((*PATH, "file"), rule))
+        found.notes.append(problem((*PATH, "file"), rule))
     found.origin = dict(log.origin) or {"name": name, "sha256": file.sha256}
     found.begin, found.zero = log.begin, log.begin if log.begin >= EPOCH else 0
     found._log, found._window = log, _window(scenario, written, found.zero)

@@ -144,8 +144,8 @@ class MeasuredComparison:
         frames: of the recording.
         clocks: of the log.
         signals: in the order in which they are written.
-        difference: the same by the rules of `diff`: the log is the baseline, the recording the candidate, and a moment's
-            frame is that of the recording.
+        difference: the same by the rules of `diff`: the log is the baseline, the recording the candidate; frames are
+            those of the recording.
     """
 
     log: str

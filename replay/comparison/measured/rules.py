@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from replay.comparison.measured.signals import Signal
 from replay.comparison.rules import Rule, Rules
+from replay.comparison.signals import Signal
 
 MEASURED = "/measured"
 """Begins the pattern of a rule that is for comparisons with a machine alone: `/measured/distance/*`."""
