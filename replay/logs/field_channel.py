@@ -153,12 +153,10 @@ class FieldChannel:
         if hasattr(value, "item") and getattr(value, "ndim", 1) == 0:
             value = value.item()
         if not isinstance(value, bool | int | float):
-            what = (
-                "a list" if isinstance(value, list | tuple) else "a message" if isinstance(value, Mapping) else "text"
-            )
-            rule = f"topic {self.channel.topic!r}: {path} is {what}, no number"
-            example = f"; name one of its {len(value)} values, such as {path}[0]" if what == "a list" else ""
-            raise RecordingError(self.file, rule + example)
+            what = "a message" if isinstance(value, Mapping) else "text"
+            if isinstance(value, list | tuple):
+                what = f"a list: name one of its {len(value)} values, such as {path}[0]"
+            raise RecordingError(self.file, f"topic {self.channel.topic!r}: {path} is no number but {what}")
         try:
             return float(value)
         except OverflowError:
