@@ -20,6 +20,9 @@ from replay.comparison import wording
 from replay.comparison.causes import Causes, causes
 from replay.comparison.difference import DiffVerdict
 from replay.comparison.effects import effects, headline
+from replay.comparison.measured.effects import effects_of, worst
+from replay.comparison.measured.report_text import lines
+from replay.comparison.measured.source import MeasuredSource, compare_scenario
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.report_text import text
@@ -81,6 +84,7 @@ class Judge:
         if not result.status.recorded or result.recordings is None:
             return self.failed(result, scenario.tags)
         item, case, drawn = self._compared(scenario, result)
+        item = self._beside_machine(scenario, item)
         if result.status is CaseStatus.BROKEN and item.verdict in _KNOWN:
             if case is not None and item.finding is not None and not item.finding.count:  # it may be expected anew
                 item = dataclasses.replace(item, finding=Finding(case.baseline, causes=_why(case)[0]))
@@ -88,6 +92,26 @@ class Judge:
             message = "; ".join([*broken, *([item.message] if item.message else [])])
             item = dataclasses.replace(item, verdict=RegressVerdict.BROKEN, message=message)
         return self._with_page(dataclasses.replace(item, tags=scenario.tags), case, drawn)
+
+    def _beside_machine(self, scenario: Scenario, item: Judged) -> Judged:
+        """Return the verdict with what the machine's log says, if the scenario names one; a failure stays one."""
+        source = MeasuredSource.of_scenario(scenario)
+        if source is None or item.result is None or item.result.recordings is None:
+            return item
+        try:
+            found = compare_scenario(item.result.recordings.mcap, scenario, source, rules=self._rules)
+        except ReplayError as error:
+            verdict, told = RegressVerdict.FAILED, str(error)
+        else:
+            if found.verdict is not DiffVerdict.DIFFERENT:
+                return item
+            verdict, told = RegressVerdict.DIFFERENT, f"beside the machine: {worst(found)}"
+            finding = item.finding or Finding(item.result.recordings.mcap)
+            report = "\n".join(filter(None, [finding.report, *lines(found)]))
+            item = dataclasses.replace(item, finding=finding.with_effects(effects_of(found), report))
+        message = "; ".join(filter(None, [item.message, told]))
+        kept = item.verdict if not item.verdict.fine and item.verdict is not RegressVerdict.DIFFERENT else verdict
+        return dataclasses.replace(item, verdict=kept, message=message)
 
     def failed(self, result: CaseResult, tags: tuple[str, ...] = ()) -> Judged:
         """Return the verdict of a scenario that has no recording, and write its page; NoSpaceError as `judge`."""

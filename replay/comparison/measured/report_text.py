@@ -8,6 +8,7 @@ from replay.alignment.clock import ClockEstimate, Undetermined
 from replay.alignment.statistics import LineFit
 from replay.comparison import quantities, wording
 from replay.comparison.difference import DiffVerdict, SignalDifference
+from replay.comparison.measured.effects import RUNS
 from replay.comparison.measured.result import MeasuredClock, MeasuredComparison, MeasuredSignal
 from replay.errors import count
 
@@ -134,10 +135,6 @@ def judged(item: SignalDifference, signal: MeasuredSignal, *, verbose: bool = Fa
     if item.rms is not None:
         above = "more than" if item.spread else "within what"
         yield f"root mean square {shown(item.rms, item.signal.unit)}, {above} the rule accepts"
-
-
-RUNS = ("log", "simulation")
-"""What the sides of a difference are called."""
 
 
 def line(fit: LineFit, unit: str) -> str:

@@ -103,7 +103,6 @@ def compare_recording(
     """
     with McapLog(path) as file:
         provenance = read_provenance(file)
-        topics = {channel.topic for channel in file.channels.values()} & own_topics(provenance.layout)
         files = read_files(file, provenance)
     scenario = load_sources(provenance.root, files, case=provenance.scenario)
     source = source or MeasuredSource.of_scenario(scenario)
@@ -112,9 +111,18 @@ def compare_recording(
             "its scenario names no log of the machine: give it a `measured`, or name the log with --measured and --map"
         )
         raise InvalidValue("recording", path, rule)
+    return compare_scenario(path, scenario, source, rules=rules)
+
+
+def compare_scenario(
+    path: str | Path, scenario: Scenario, source: MeasuredSource, *, rules: Rules | None = None
+) -> MeasuredComparison:
+    """Return what the recording of a scenario says beside a log of the machine; errors as of `compare_recording`."""
     log = measured_log.read(scenario, source.written, source.library, source.name, source.problem)
     if log.problems:
         raise ScenarioError(log.problems)
+    with McapLog(path) as file:
+        topics = {channel.topic for channel in file.channels.values()} & own_topics(read_provenance(file).layout)
     recording = read(path, topics=_needed(topics, source.written))
     return compare(recording, source.written, log, rules=rules, problem=source.problem)
 
