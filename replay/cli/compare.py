@@ -23,6 +23,8 @@ FILE = PathName()
 @options.model_option
 @options.format_option
 @click.option("-v", "--verbose", is_flag=True, help="List every event and rule.")
+@click.option("--html", type=FILE, help="Write a page with drawings.")
+@click.option("--junit", type=FILE, help="Write a JUnit report.")
 def compare(
     scenario: Path,
     log: Path | None,
@@ -32,6 +34,8 @@ def compare(
     model: str | None,
     form: str,
     verbose: bool,
+    html: Path | None,
+    junit: Path | None,
 ) -> ExitCode:
     """Compare SCENARIO (a file, or a recording, which is not run again) with a log of the real machine.
 
@@ -41,6 +45,7 @@ def compare(
     from replay.batch.select import rules_beside
     from replay.cli.progress import RunProgress
     from replay.comparison.difference import DiffVerdict
+    from replay.comparison.measured.outputs import write
     from replay.comparison.measured.report_text import lines
     from replay.comparison.rules_file import read_rules
     from replay.scenario.load import load_model
@@ -53,6 +58,7 @@ def compare(
             compare_all(scenario, log=log, mapping=mapping, rules=tolerances, model=chosen, output=output, watch=watch)
         )
     found = [case.found for case in cases if case.found is not None]
+    write(found, html=html, junit=junit)
     for case in cases:
         if case.found is None:
             options.note(f"{case.name}: failed: {case.error}")

@@ -264,7 +264,7 @@ def _read_measured(
     problems: list[Problem],
 ) -> None:
     """Read the log of the real machine, and keep of it what the comparison needs."""
-    from replay.scenario.measured_log import PATH, read
+    from replay.scenario.measured_log import MEASURED, PATH, read
 
     provenance = scenario.provenance
     name = _log_name(text, root, PATH, problems)
@@ -277,7 +277,7 @@ def _read_measured(
     if not found.problems:
         provenance.measured = name
         provenance.sources[name] = found.excerpt(same)
-        provenance.originals[name] = dict(found.origin)
+        provenance.originals[name] = {**found.origin, **({} if same else {"use": MEASURED})}
 
 
 def _log_name(text: ScenarioText, root: Node, path: KeyPath, problems: list[Problem]) -> str | None:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from replay.scenario.recorded import RecordedMotion
 
 PATH: KeyPath = ("measured",)
+MEASURED = "measured"
+"""What an original says of its use if nothing of the simulation depends on it."""
 BESIDE = 3 * 10**9
 """Time [ns] before and after the scenario that is kept of a log whose offset is given, so that it can be checked."""
 

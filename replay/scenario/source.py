@@ -57,7 +57,8 @@ class ScenarioProvenance:
         tracks: recorded motion by joint, read from a log, of which an excerpt is among the sources.
         free_tracks: recorded poses by free joint.
         measured: name of the log of the real machine among the sources; "" for none.
-        originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name.
+        originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name;
+            and its `use`, of one that no reading depends on.
         log_notes: what a reader should know of the log although it is read.
         root: the text's tree, includes merged.
     """
