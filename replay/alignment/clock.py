@@ -52,11 +52,15 @@ class SignalDelay:
         name: of the signal.
         delay: of what was measured behind what was simulated [s], on the clock that was found for all.
         interval: that covers it [s].
+        deviation: its standard deviation [s].
+        freedom: degrees of freedom of that number.
     """
 
     name: str
     delay: float
     interval: tuple[float, float]
+    deviation: float
+    freedom: float
 
 
 @dataclass(frozen=True)
@@ -65,13 +69,13 @@ class ClockEstimate(LogClock):
 
     Attributes:
         offset_interval: covers the true offset with the probability asked for [s].
-        drift_interval: the same of the drift; (0, 0) where none was looked for.
+        drift_interval: the same of the drift; (0, 0) where none was looked for, -1 .. 1 where nothing tells it.
         confidence: the probability.
         spread: standard deviations of offset and drift.
         used: the signals that told it.
         unused: the others, each with the reason.
         delays: what each signal says by itself.
-        agree: whether these agree with each other; where not, the interval is as wide as they are apart.
+        agree: whether these agree with each other; where not, the interval holds those of all.
     """
 
     offset_interval: tuple[float, float] = (0.0, 0.0)

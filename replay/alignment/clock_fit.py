@@ -30,6 +30,9 @@ from replay.alignment.trace import FEWEST, Trace
 from replay.numerics.arrays import Flags, Floats
 
 _MOST_STEPS = 30
+_SINGULAR = 1e10
+"""Condition of the equations for the clock above which they do not determine it."""
+
 _EXACT = 1e-12
 """Residuals below this part of a signal's size are rounding."""
 
@@ -59,6 +62,16 @@ class SignalFit:
     simulated: Floats
     smooth: Floats
     exact: Floats
+
+    @property
+    def log_time(self) -> Floats:
+        """(u,) times of the samples used [s]."""
+        return self.trace.log_time[self.used]
+
+    @property
+    def columns(self) -> Floats:
+        """(2, u) orthonormal: what bias and scale were fitted with."""
+        return np.array([np.full(len(self.residual), 1.0 / np.sqrt(len(self.residual))), self.simulated])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +111,26 @@ def fit_at(traces: Sequence[Trace], offset: float, drift: float, reference: floa
     unknowns = 2 if drifts else 1
     normal, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
     for signal in there:
-        normal += signal.smooth @ signal.exact.T / signal.noise**2
-        right += signal.smooth @ signal.residual / signal.noise**2
+        normal += _products(signal.smooth, signal.exact) / signal.noise**2
+        right += (signal.smooth * signal.residual).sum(axis=1) / signal.noise**2
+    covariance = _inverse(normal)
+    step = covariance @ right if np.isfinite(covariance).all() else np.zeros(unknowns)
+    return ClockFit(offset, drift, reference, there, step, covariance)
+
+
+def _products(a: Floats, b: Floats) -> Floats:
+    """Return the scalar products of rows; not by BLAS, whose sums depend on the number of its threads."""
+    return np.asarray(np.einsum("in,jn->ij", a, b))
+
+
+def _inverse(normal: Floats) -> Floats:
+    """Return the inverse of a matrix of one or two rows, infinite where it has none."""
     size = np.sqrt(np.abs(np.diag(normal)))
-    covariance = np.full((unknowns, unknowns), np.inf)
-    step = np.zeros(unknowns)
     if (size > 0.0).all():
         scaled = normal / np.outer(size, size)
-        if np.linalg.cond(scaled) < 1e10:
-            inverse = np.linalg.inv(scaled) / np.outer(size, size)
-            covariance, step = inverse, inverse @ right
-    return ClockFit(offset, drift, reference, there, step, covariance)
+        if np.linalg.cond(scaled) < _SINGULAR:
+            return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
+    return np.full(normal.shape, np.inf)
 
 
 def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drifts: bool) -> SignalFit | None:
@@ -122,37 +144,37 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
     s, y = simulated[used], trace.measured[used]
     s = s - s.mean()
     y = y - y.mean()
-    norm, size = float(np.sqrt(s @ s)), float(y @ y)
+    norm, size = float(np.sqrt((s**2).sum())), float((y**2).sum())
     if not (norm > 1e-6 * np.sqrt(count) and size > 1e-12 * count):
         return None
     s /= norm
-    along = float(s @ y)
+    along = float((s * y).sum())
     residual = y - along * s
-    squares = max(float(residual @ residual), size * _EXACT**2)
+    squares = max(float((residual**2).sum()), size * _EXACT**2)
     gain = 0.5 * count * np.log(size / squares)
     smooth, exact = places.values(trace.slopes)[used], trace.lines[places.index[used]]
     smooth, exact = ((slope * (along / norm))[None] for slope in (smooth, exact))
     if drifts:
         smooth, exact = (np.vstack([slope, slope * since[used]]) for slope in (smooth, exact))
     smooth -= smooth.mean(axis=1)[:, None]
-    smooth -= (smooth @ s)[:, None] * s
+    smooth -= (smooth * s).sum(axis=1)[:, None] * s
     noise = float(np.sqrt(squares / (count - 2)))
     return SignalFit(trace, used, residual, noise, along / norm, float(gain), s, smooth, exact)
 
 
-def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, drifts: bool) -> ClockFit:
+def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
     """Return the best clock near one.
 
     Args:
         traces: the signals.
-        start: a clock; of its reference.
+        start: a clock, whose drift is looked for if it has a step for it.
         reach: longest step of the offset [s].
-        drifts: whether the drift is looked for as well.
+        close: a step of less than this part of the standard deviation is the last.
     """
-    best, step = start, start.step
+    best, step, drifts = start, start.step, len(start.step) > 1
     for _ in range(_MOST_STEPS):
         step = step * min(1.0, reach / max(abs(float(step[0])), 1e-300))
-        if not np.isfinite(best.covariance).all() or (step**2 <= 1e-6 * np.diag(best.covariance)).all():
+        if not np.isfinite(best.covariance).all() or (step**2 <= close**2 * np.diag(best.covariance)).all():
             break
         drift = best.drift + (float(step[1]) if drifts else 0.0)
         tried = fit_at(traces, best.offset + float(step[0]), drift, best.reference, drifts=drifts)
@@ -169,20 +191,20 @@ def moved(traces: Sequence[Trace], fit: ClockFit, reference: float, *, drifts: b
 
 
 def spreads(fit: ClockFit) -> tuple[Spread, ...]:
-    """Return how far each number of a clock may be off: offset and, where looked for, drift."""
-    times = [signal.trace.log_time[signal.used] for signal in fit.signals]
+    """Return how far each number of a clock may be off once its step is taken: offset and, where looked for, drift."""
+    times = [signal.log_time for signal in fit.signals]
     first, last = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-    square = sum(s.smooth @ s.smooth.T / s.noise**2 for s in fit.signals)
+    square = sum(_products(s.smooth, s.smooth) / s.noise**2 for s in fit.signals)
     whitening = np.linalg.inv(np.linalg.cholesky(square))
     results = []
     for number in range(len(fit.step)):
         sums, shared = SpreadSums(first, last), np.zeros((len(fit.step), BINS))
         for signal, time in zip(fit.signals, times, strict=True):
-            weight = fit.covariance[number] @ signal.smooth / signal.noise**2
+            weight = (fit.covariance[number][:, None] * signal.smooth).sum(axis=0) / signal.noise**2
             bins = sums.bins(time)
-            constant = np.full(len(time), 1.0 / np.sqrt(len(time)))
-            sums.add(bins, weight, signal.residual, signal.noise, np.array([constant, signal.simulated]))
-            together = whitening @ signal.smooth
+            left = signal.residual - (fit.step[:, None] * signal.smooth).sum(axis=0)
+            sums.add(bins, weight, left, signal.noise, signal.columns)
+            together = _products(whitening, signal.smooth.T)
             for row, column in zip(shared, together, strict=True):
                 row += np.bincount(bins, weight * column, BINS)
         results.append(sums.spread(shared))

@@ -33,7 +33,7 @@ from replay.numerics.arrays import Floats, Integers
 COSINES = 12
 """With them an interval is 1.11 of what it would be if the variance were known."""
 
-BINS = 4096
+BINS = 1024
 """Parts of the time in which samples are taken together."""
 
 
@@ -106,12 +106,12 @@ class SpreadSums:
             return Spread(0.0, float(COSINES), 1.0)
         u = (np.cumsum(self.information) - 0.5 * self.information) / total
         cosines = np.cos(np.pi * np.arange(1, COSINES + 1)[:, None] * u)
-        seen = cosines @ self.errors
-        K = (cosines * self.information) @ cosines.T
-        off = np.vstack([*self.fitted, *shared]) @ cosines.T
-        K -= off.T @ off
+        seen = (cosines * self.errors).sum(axis=1)
+        K = np.einsum("kb,lb,b->kl", cosines, cosines, self.information)
+        off = np.einsum("pb,kb->pk", np.vstack([*self.fitted, *shared]), cosines)
+        K -= np.einsum("pk,pl->kl", off, off)
         trace = float(np.trace(K))
         if not trace > 1e-9 * total:
             return Spread(np.inf, 1.0, 1.0)
-        variance = float(seen @ seen) / trace * total
+        variance = float((seen**2).sum()) / trace * total
         return Spread(float(np.sqrt(variance)), max(trace**2 / float(np.sum(K * K)), 1.0), variance / total)

@@ -92,11 +92,11 @@ def _correlation(matched: SampledFrames) -> float:
         size = float(np.max(np.abs(values)))
         scaled = values / size if size > 0.0 else values
         off = scaled - np.mean(scaled)
-        norm = float(np.sqrt(off @ off))
+        norm = float(np.sqrt((off**2).sum()))
         if not norm > 1e-12 * np.sqrt(len(values)):
             return float("nan")
         sides.append(off / norm)
-    return float(np.clip(sides[0] @ sides[1], -1.0, 1.0))
+    return float(np.clip((sides[0] * sides[1]).sum(), -1.0, 1.0))
 
 
 def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFit | None:
@@ -125,13 +125,13 @@ def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFi
     s, y = s / largest[0], y / largest[1]
     mean, y_mean = float(np.mean(s)), float(np.mean(y))
     off = s - mean
-    norm = float(np.sqrt(off @ off))
+    norm = float(np.sqrt((off**2).sum()))
     if not norm > 1e-9 * np.sqrt(n):
         return None
-    scale = float(off @ (y - y_mean)) / norm**2
+    scale = float((off * (y - y_mean)).sum()) / norm**2
     offset = y_mean - scale * mean
     residual = y - y_mean - scale * off
-    noise = float(np.sqrt(residual @ residual / (n - 2)))
+    noise = float(np.sqrt((residual**2).sum() / (n - 2)))
     to_scale = off / norm**2
     to_offset = 1.0 / n - mean * to_scale
     columns = np.array([np.full(n, 1.0 / np.sqrt(n)), off / norm])
@@ -141,8 +141,8 @@ def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFi
     for best, weight, unit in ((scale, to_scale, largest[1] / largest[0]), (offset, to_offset, largest[1])):
         sums = SpreadSums(float(log_time[0]), float(log_time[-1]))
         sums.add(sums.bins(log_time), weight, residual, noise, columns)
-        spread = sums.spread(np.zeros((0, BINS)))
-        of_clock = [float(weight @ move) * deviation for move, deviation in zip(moves, clock.deviations, strict=True)]
-        half = spread.half(confidence, float(np.hypot(of_clock[0], of_clock[1])))
+        of_offset, of_drift = (float((weight * move).sum()) for move in moves)
+        of_clock = float(np.hypot(of_offset * clock.deviations[0], of_drift * clock.deviations[1]))
+        half = sums.spread(np.zeros((0, BINS))).half(confidence, of_clock)
         intervals.append((best * unit - half * unit, best * unit + half * unit))
     return LineFit(scale * largest[1] / largest[0], offset * largest[1], intervals[0], intervals[1])
