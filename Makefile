@@ -90,6 +90,8 @@ pictures: $(VENV)/.test system  ## make the README's pictures, three of them fro
 	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.ours --no-rrd --overwrite
 	$(BIN)/replay diff $(RECORDINGS)/.thesis $(RECORDINGS)/.ours --rules scenarios/rules.yaml --html $(RECORDINGS)/.html || test $$? = 1
 	$(BIN)/python -m tests.pictures $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/thesis_and_ours.png
+	$(BIN)/replay compare scenarios/carm_parking_measured.yaml --html $(RECORDINGS)/.html
+	$(BIN)/python -m tests.pictures $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/beside_the_machine.png
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak

@@ -1,4 +1,4 @@
-"""One signal of a diff's HTML page as a picture: python -m tests.pictures PAGE SIGNAL PICTURE."""
+"""One signal of the HTML page of a diff, or of a comparison with a machine, as a picture: python -m tests.pictures PAGE SIGNAL PICTURE."""
 
 import shutil
 import sys
@@ -14,7 +14,8 @@ def take(page: Path, signal: str, picture: Path) -> None:
         opened = browser.new_page(viewport={"width": 1000, "height": 800})
         opened.goto(page.absolute().as_uri())
         box = opened.locator("details.signal").filter(has=opened.get_by_text(signal, exact=True))
-        box.locator("summary").click()
+        if not box.evaluate("details => details.open"):
+            box.locator("summary").click()
         box.screenshot(path=picture)
         browser.close()
 
