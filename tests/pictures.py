@@ -1,4 +1,4 @@
-"""One signal of the HTML page of a diff, or of a comparison with a machine, as a picture: python -m tests.pictures PAGE SIGNAL PICTURE."""
+"""One signal of the HTML page of a diff or of a comparison: python -m tests.pictures PAGE SIGNAL PICTURE."""
 
 import shutil
 import sys

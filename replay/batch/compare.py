@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +37,7 @@ def compare_all(
     rules: Rules | None = None,
     model: Model | None = None,
     output: Path | None = None,
+    visit: Callable[[Path, MeasuredComparison, bool], None] = lambda recording, found, several: None,
     watch: Watch | None = None,
 ) -> Iterator[ComparedCase]:
     """Yield what the recording of each scenario says beside a log of the machine, as soon as all are run.
@@ -48,6 +49,7 @@ def compare_all(
         rules: tolerances; without them everything must be equal.
         model: replaces the scenario's own.
         output: run folder for the recordings; they are not kept when left out.
+        visit: called with each recording, while it is there, its comparison, and whether it is one of several.
         watch: follows the run.
 
     Raises:
@@ -63,7 +65,9 @@ def compare_all(
             if value is not None:
                 raise InvalidValue("SCENARIO", path, f"is a recording, which is not run again: {option} has no effect")
         name = scenarios[0].name
-        yield ComparedCase(name, compare_recording(path, source=sources[name], rules=rules))
+        found = compare_recording(path, source=sources[name], rules=rules)
+        visit(path, found, False)
+        yield ComparedCase(name, found)
         return
     with contextlib.ExitStack() as stack:
         folder = output or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="replay-")))
@@ -77,6 +81,7 @@ def compare_all(
                 yield ComparedCase(result.name, None, result.error)
             else:
                 found = compare_recording(result.recordings.mcap, source=sources[result.name], rules=rules)
+                visit(result.recordings.mcap, found, len(scenarios) > 1)
                 yield ComparedCase(result.name, found)
 
 

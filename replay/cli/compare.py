@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -25,18 +26,8 @@ FILE = PathName()
 @click.option("-v", "--verbose", is_flag=True, help="List every event and rule.")
 @click.option("--html", type=FILE, help="Write a page with drawings.")
 @click.option("--junit", type=FILE, help="Write a JUnit report.")
-def compare(
-    scenario: Path,
-    log: Path | None,
-    mapping: Path | None,
-    rules: Path | None,
-    output: Path | None,
-    model: str | None,
-    form: str,
-    verbose: bool,
-    html: Path | None,
-    junit: Path | None,
-) -> ExitCode:
+@click.option("--rrd", type=FILE, help="Write a rerun recording that shows both; a folder for a sweep.")
+def compare(scenario: Path, rules: Path | None, model: str | None, form: str, verbose: bool, **how: Any) -> ExitCode:
     """Compare SCENARIO (a file, or a recording, which is not run again) with a log of the real machine.
 
     Exit codes: 0 within the rules, 1 different, 2 invalid input or a clock that cannot be told, 4 a scenario failed.
@@ -45,23 +36,22 @@ def compare(
     from replay.batch.select import rules_beside
     from replay.cli.progress import RunProgress
     from replay.comparison.difference import DiffVerdict
-    from replay.comparison.measured.outputs import write
+    from replay.comparison.measured.outputs import MeasuredOutputs
     from replay.comparison.measured.report_text import lines
     from replay.comparison.rules_file import read_rules
     from replay.scenario.load import load_model
 
+    outputs = MeasuredOutputs(**{name: how.pop(name) for name in ("html", "junit", "rrd")})
     rules = rules or rules_beside([scenario])
-    tolerances = read_rules(rules, today=datetime.date.today()) if rules else None
-    chosen = None if model is None else load_model(model)
+    how["rules"] = read_rules(rules, today=datetime.date.today()) if rules else None
+    how["model"] = None if model is None else load_model(model)
     with RunProgress() as watch:
-        cases = list(
-            compare_all(scenario, log=log, mapping=mapping, rules=tolerances, model=chosen, output=output, watch=watch)
-        )
-    found = [case.found for case in cases if case.found is not None]
-    write(found, html=html, junit=junit)
+        cases = list(compare_all(scenario, visit=outputs.visit, watch=watch, **how))
     for case in cases:
         if case.found is None:
             options.note(f"{case.name}: failed: {case.error}")
+    found = [case.found for case in cases if case.found is not None]
+    outputs.write(found)
     told = (line for one in found for line in lines(one, verbose=verbose))
     options.say(form, lambda: told, lambda: [one.as_json() for one in found])
     different = any(one.verdict is DiffVerdict.DIFFERENT for one in found)

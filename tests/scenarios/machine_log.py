@@ -42,7 +42,7 @@ def _written(folder: Path, files: dict[str, bytes]) -> Path:
 
 
 def log_of(recording: replay.Recording) -> str:
-    """Return the log: samples at 50 Hz with jitter of 2 ms, noise of 1 mm and 0.02 deg, whole millimetres, 0 for nothing."""
+    """Return the log: 50 Hz with jitter of 2 ms, noise of 1 mm and 0.02 deg, whole millimetres, 0 for nothing."""
     rng = np.random.default_rng(2015)
     frames = recording.time / 1e9
     time = np.arange(0.0, 6.0, 0.02)
