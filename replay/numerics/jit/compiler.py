@@ -57,9 +57,7 @@ except ImportError:  # another numba: see the module's text
 AVAILABLE = (
     numba.__version__.startswith(TRIED)
     and bool(_NEEDED and front_end.NEEDED and linking.NEEDED)
-    and all(
-        hasattr(place, name) for place, names in (*_NEEDED, *front_end.NEEDED, *linking.NEEDED) for name in names
-    )
+    and all(hasattr(place, name) for place, names in (*_NEEDED, *front_end.NEEDED, *linking.NEEDED) for name in names)
 )
 """Whether this numba is one whose inner side is known."""
 
