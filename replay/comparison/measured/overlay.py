@@ -1,4 +1,4 @@
-"""A recording beside what the machine measured, in one rerun recording: the scene, both curves of each signal, residual."""
+"""A recording beside what the machine measured, as a rerun recording: the scene, both curves of each signal, residuals."""
 
 from __future__ import annotations
 
