@@ -45,7 +45,7 @@ class SignalFit:
         trace: its samples.
         used: (m,) whether a sample lies between two frames that have a value.
         residual: (u,) of those, of measured size 1.
-        noise: their standard deviation.
+        noise: their standard deviation, and what lines between frames may be off.
         scale: by which the simulated signal of size 1 is best multiplied.
         gain: logarithm of the likelihood over that of a constant; 0 where nothing can be said.
         simulated: (u,) orthonormal to 1.
@@ -158,8 +158,9 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
         smooth, exact = (np.vstack([slope, slope * since[used]]) for slope in (smooth, exact))
     smooth -= smooth.mean(axis=1)[:, None]
     smooth -= (smooth * s).sum(axis=1)[:, None] * s
-    noise = float(np.sqrt(squares / (count - 2)))
-    return SignalFit(trace, used, residual, noise, along / norm, float(gain), s, smooth, exact)
+    scale = along / norm
+    noise = float(np.hypot(np.sqrt(squares / (count - 2)), scale * trace.bends))
+    return SignalFit(trace, used, residual, noise, scale, float(gain), s, smooth, exact)
 
 
 def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
