@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.between import slopes
+from replay.alignment.between import line_errors, slopes
 from replay.alignment.pair import SignalPair
 from replay.numerics.arrays import Floats
 
@@ -33,7 +33,7 @@ class Trace:
         slopes: (n,) slopes at frames [1/s].
         log_time: (m,) of the samples [s], on the log's clock.
         measured: (m,) of mean 0 and standard deviation 1.
-        bends: how far the lines between frames may be off, root mean square: an eighth of the second differences.
+        bends: (n - 1,) how far each line between frames may be off, see `line_errors`.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Trace:
     slopes: Floats
     log_time: Floats
     measured: Floats
-    bends: float
+    bends: Floats
 
     def thinned(self, most: int) -> Trace:
         """Return a trace of fewer samples, see `thinned`."""
@@ -90,10 +90,7 @@ def trace_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> 
     if taken is None:
         return "the measured signal is constant"
     lines, at_frames = slopes(time, simulated)
-    seconds = np.diff(simulated, 2)
-    seconds = seconds[np.isfinite(seconds)]
-    bends = float(np.sqrt(np.mean(seconds**2))) / 8.0 if len(seconds) else 0.0
-    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, bends)
+    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, line_errors(simulated))
 
 
 def frames_of(pair: SignalPair) -> tuple[Floats, Floats]:

@@ -107,11 +107,21 @@ def test_a_state_without_noise_leaves_the_others_their_say():
     assert clock.offset_interval[0] <= 0.137 <= clock.offset_interval[1]
 
 
-def test_without_noise_the_interval_is_a_nanosecond():
+def test_without_noise_the_interval_is_what_lines_between_frames_may_hide():
+    """Of a hill 36 frames wide little, and never less than a nanosecond."""
     pair = SignalPair("/a", FRAMES, hill(FRAMES), FRAMES - 0.1, hill(FRAMES))
     clock = told([pair])
     assert clock.offset == pytest.approx(0.1, abs=1e-9)
-    assert np.diff(clock.offset_interval)[0] == pytest.approx(2e-9, rel=1e-3)
+    assert 2e-9 <= np.diff(clock.offset_interval)[0] < 2e-4
+
+
+def test_a_jump_that_samples_pass_by_is_not_told_better_than_it_is():
+    for seed in range(10):
+        offset = 0.1 + 0.013 * seed
+        pair = pair_of(lambda t: (t > 3.0).astype(float), np.arange(0.0, 6.0, 0.02), offset)
+        clock = told([pair])
+        if isinstance(clock, ClockEstimate):
+            assert clock.offset_interval[0] - 1.0 / 60.0 <= offset <= clock.offset_interval[1] + 1.0 / 60.0
 
 
 def test_several_signals_share_the_clock():
