@@ -45,7 +45,8 @@ class SignalFit:
         trace: its samples.
         used: (m,) whether a sample lies between two frames that have a value.
         residual: (u,) of those, of measured size 1.
-        noise: their standard deviation.
+        off_lines: (u,) how far lines between frames may be off there.
+        noise: standard deviation of both.
         scale: by which the simulated signal of size 1 is best multiplied.
         gain: logarithm of the likelihood over that of a constant; 0 where nothing can be said.
         simulated: (u,) orthonormal to 1.
@@ -56,6 +57,7 @@ class SignalFit:
     trace: Trace
     used: Flags
     residual: Floats
+    off_lines: Floats
     noise: float
     scale: float
     gain: float
@@ -158,8 +160,10 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
         smooth, exact = (np.vstack([slope, slope * since[used]]) for slope in (smooth, exact))
     smooth -= smooth.mean(axis=1)[:, None]
     smooth -= (smooth * s).sum(axis=1)[:, None] * s
-    noise = float(np.sqrt(squares / (count - 2)))
-    return SignalFit(trace, used, residual, noise, along / norm, float(gain), s, smooth, exact)
+    scale = along / norm
+    off_lines = scale * trace.bends[places.index[used]]
+    noise = float(np.sqrt(squares / (count - 2) + np.mean(off_lines**2)))
+    return SignalFit(trace, used, residual, off_lines, noise, scale, float(gain), s, smooth, exact)
 
 
 def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
@@ -203,7 +207,7 @@ def spreads(fit: ClockFit) -> tuple[Spread, ...]:
             weight = (fit.covariance[number][:, None] * signal.smooth).sum(axis=0) / signal.noise**2
             bins = sums.bins(time)
             left = signal.residual - (fit.step[:, None] * signal.smooth).sum(axis=0)
-            sums.add(bins, weight, left, signal.noise, signal.columns)
+            sums.add(bins, weight, left, signal.off_lines, signal.noise, signal.columns)
             together = _products(whitening, signal.smooth.T)
             for row, column in zip(shared, together, strict=True):
                 row += np.bincount(bins, weight * column, BINS)

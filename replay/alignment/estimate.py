@@ -15,14 +15,17 @@ from replay.alignment.rivals import is_refuted, is_significant
 from replay.alignment.trace import Trace, trace_of
 from replay.errors import InvalidValue
 
-_MOST_LOOKED_AT = 1 << 13
-"""Samples of a signal by which candidates are compared."""
+_MOST_LOOKED_AT, _LEAST_LOOKED_AT = 1 << 16, 1 << 10
+"""Samples of all signals, and of one at least, by which candidates are compared."""
 
 _LEAST_OVERLAP = 0.2
 """Of the shorter of both, scenario and log, so much must overlap."""
 
-_RIVAL = 0.4
+_RIVAL = 0.3
 """What explains less than this part of what the best clock does is no rival: short pieces are often alike."""
+
+_EXACT = 1e-9
+"""Times are exact to the nanosecond: no offset is told better than that [s]."""
 
 _CLOSE = 1e-3
 """Steps of less than this part of the standard deviation change nothing."""
@@ -53,12 +56,15 @@ def estimate_clock(
         raise InvalidValue("lowest, highest", f"{lowest}, {highest}", "must be finite, the first below the second")
     if not 0.0 < confidence < 1.0:
         raise InvalidValue("confidence", confidence, "must be between 0 and 1")
-    made = [(pair.name, trace_of(pair)) for pair in pairs]
+    begins, ends = (np.array([float(pair.time[at]) for pair in pairs if len(pair.time)]) for at in (0, -1))
+    beside = float(np.max(ends) - np.min(begins)) if len(begins) else 0.0  # a better offset out there is noticed
+    first, last = np.min(begins, initial=np.inf) - highest - beside, np.max(ends, initial=-np.inf) - lowest + beside
+    made = [(pair.name, trace_of(pair, first, last)) for pair in pairs]
     traces = [trace for _, trace in made if isinstance(trace, Trace)]
     unused = tuple((name, reason) for name, reason in made if isinstance(reason, str))
     if not traces:
         return Undetermined(_nothing_moves(unused), unused=unused)
-    few = [trace.thinned(_MOST_LOOKED_AT) for trace in traces]
+    few = [trace.thinned(max(_MOST_LOOKED_AT // len(traces), _LEAST_LOOKED_AT)) for trace in traces]
     found = candidates(few, drifts=drift)
     best = _only_one(found, lowest, highest, pace(few))
     if isinstance(best, Undetermined):
@@ -157,7 +163,7 @@ def _told(
         unused: signals, with reasons.
     """
     spread = spreads(fit)[0]
-    half = spread.half(confidence)
+    half = max(spread.half(confidence), _EXACT + 4.0 * float(np.spacing(np.max(np.abs([fit.offset, fit.reference])))))
     if not half <= widest:
         return Undetermined(f"the offset is told to +-{half:.2g} s only", unused=unused)
     delays = signal_delays(fit, confidence)
@@ -166,7 +172,7 @@ def _told(
     if not agree:
         low = min([low, *(fit.offset - delay.interval[1] for delay in delays)])
         high = max([high, *(fit.offset - delay.interval[0] for delay in delays)])
-    wider = max(high - fit.offset, fit.offset - low) / half if half > 0.0 else 1.0
+    wider = max(high - fit.offset, fit.offset - low) / half
     return ClockEstimate(
         fit.offset,
         fit.drift,

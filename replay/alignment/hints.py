@@ -59,7 +59,8 @@ def hints(matched: SampledFrames, statistics: ResidualStatistics) -> tuple[str, 
         and _size(matched.residual - statistics.bias) < _LEFT * rms
     ):
         found.append(f"a constant of {statistics.bias:.4g} explains most of it")
-    if not found:
+    off = _size(measured - np.mean(measured)) * math.sqrt(max(1.0 - statistics.correlation**2, 0.0))
+    if not found and not off < _LEFT * rms:  # else the best scale and offset explain it, which statistics tell
         delay = own_delay(matched)
         if delay is not None:
             found.append(f"a delay of {1e3 * delay:.4g} ms of this signal alone explains most of it")

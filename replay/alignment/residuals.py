@@ -90,19 +90,19 @@ def match(pair: SignalPair, clock: LogClock, *, max_gap: float) -> SampledFrames
     at_frames, enclosed, there = np.full(n, np.nan), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     next_to = np.zeros(m, dtype=bool)
     if m and n:
-        before = np.searchsorted(samples, frames + _SAME_TIME, side="right") - 1
-        after = np.minimum(before + 1, m - 1)
-        before = np.maximum(before, 0)
-        on = np.abs(samples[before] - frames) <= _SAME_TIME
-        gap = samples[after] - samples[before]
-        enclosed = on | ((samples[before] < frames) & (samples[after] > frames) & (gap <= max_gap))
-        weight = np.where(on, 0.0, (frames - samples[before]) / np.where(gap > 0.0, gap, 1.0))
-        first, second = value[before], value[after]
-        with np.errstate(invalid="ignore"):
-            between = first if pair.steps else np.where(weight == 0.0, first, first + weight * (second - first))
+        earlier = np.searchsorted(samples, frames + _SAME_TIME, side="right")
+        before, after = np.maximum(earlier - 1, 0), np.minimum(earlier, m - 1)
+        first, second = samples[before], samples[after]
+        on = np.abs(first - frames) <= _SAME_TIME
+        gap = second - first
+        enclosed = on | ((first < frames) & (second > frames) & (gap <= max_gap))
+        weight = np.where(on, 0.0, (frames - first) / np.where(gap > 0.0, gap, 1.0))
+        low, high = value[before], value[after]
+        with np.errstate(invalid="ignore", over="ignore"):
+            between = low if pair.steps else np.where(weight == 0.0, low, low + weight * (high - low))
         at_frames = np.where(enclosed, between, np.nan)
-        there = enclosed & ~np.isnan(np.where(pair.steps | (weight <= 0.5), first, second))
-        next_to = _next_to(samples, frames, enclosed)
+        there = enclosed & ~np.isnan(np.where(pair.steps | (weight <= 0.5), low, high))
+        next_to = _next_to(earlier, m, enclosed) & (samples >= frames[0] - _SAME_TIME)
     simulated_there = ~np.isnan(pair.value)
     kept = np.flatnonzero(np.isfinite(at_frames) & np.isfinite(pair.value))
     simulated, measured = pair.value[kept], at_frames[kept]
@@ -121,9 +121,14 @@ def match(pair: SignalPair, clock: LogClock, *, max_gap: float) -> SampledFrames
     )
 
 
-def _next_to(samples: Floats, frames: Floats, enclosed: Flags) -> Flags:
-    """Return whether each sample lies among the frames and the frame before or after it is enclosed."""
-    last = np.searchsorted(frames, samples + _SAME_TIME, side="right") - 1
-    inside = (last >= 0) & (samples <= frames[-1] + _SAME_TIME)
-    last = np.maximum(last, 0)
-    return np.asarray(inside & (enclosed[last] | enclosed[np.minimum(last + 1, len(frames) - 1)]))
+def _next_to(earlier: Integers, count: int, enclosed: Flags) -> Flags:
+    """Return whether the frame before or after each of some samples is enclosed, False after the last frame.
+
+    Args:
+        earlier: (n,) how many samples are not later than each frame.
+        count: of the samples.
+        enclosed: (n,) see `SampledFrames`.
+    """
+    passed = np.cumsum(np.bincount(earlier, minlength=count + 1))[:count]  # frames before each sample
+    last = len(enclosed) - 1
+    return np.asarray((passed <= last) & (enclosed[np.maximum(passed - 1, 0)] | enclosed[np.minimum(passed, last)]))

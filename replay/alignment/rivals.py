@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from replay.alignment.clock_fit import ClockFit, SignalFit
+from replay.alignment.clock_fit import ClockFit
 from replay.numerics.arrays import Floats
 
 _CERTAIN = 6.0
@@ -17,13 +17,13 @@ _CHANCE = 1e-4
 def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
     """Return whether a clock is out of the question, as another explains the same samples better.
 
-    Samples that only the other explains say nothing against it: of a periodic motion, the clock with the largest
-    overlap is not the likelier one. With the noise n of the better fit, on its samples
+    Samples that only the other explains say nothing against it: of a periodic motion, the one with the largest overlap
+    is not the likelier one. With the noise n of the better fit, the samples of this one say
 
         2 log odds = sum r^2 / n^2 - 1  -  sum over those of both  r_better^2 / n^2 - 1,
 
-    of which the first sum has the variance 2 for each sample that is not in the second. Errors that last several samples
-    make all of it larger by their number.
+    of which the first sum has the variance 2 for each sample that is not in the second. Errors that last several
+    samples make all of it larger by their number.
     """
     best = {signal.trace.name: signal for signal in better.signals}
     odds, alone = 0.0, 0
@@ -31,7 +31,7 @@ def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
         other = best.get(signal.trace.name)
         if other is None:
             continue
-        noise = other.noise**2 + _between_frames(other) ** 2
+        noise = other.noise**2
         mine, theirs = (np.zeros(len(signal.used)) for _ in range(2))
         mine[signal.used] = signal.residual**2 / noise - 1.0
         theirs[other.used] = other.residual**2 / noise - 1.0
@@ -76,11 +76,3 @@ def _autocorrelation(values: Floats) -> Floats:
     length = next_fast_len(2 * len(values), real=True)
     products = irfft(np.abs(rfft(values, length)) ** 2, length)[: len(values)]
     return np.asarray(products / products[0] if products[0] > 0.0 else np.zeros(len(values)))
-
-
-def _between_frames(signal: SignalFit) -> float:
-    """Return how far lines between frames may be off: an eighth of the second differences, root mean square."""
-    value = signal.trace.value
-    bends = value[2:] - 2.0 * value[1:-1] + value[:-2]
-    bends = bends[np.isfinite(bends)]
-    return abs(signal.scale) * float(np.sqrt(np.mean(bends**2))) / 8.0 if len(bends) else 0.0

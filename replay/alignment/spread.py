@@ -42,14 +42,19 @@ class Spread:
     """What is known of an estimate's error.
 
     Attributes:
-        deviation: standard deviation, in the estimate's unit.
+        seen: standard deviation that residuals show, in the estimate's unit.
         freedom: degrees of freedom of that number.
-        colour: its variance over what it would be if all errors were independent and of one size.
+        hidden: standard deviation by what is interpolated and may be off.
     """
 
-    deviation: float
+    seen: float
     freedom: float
-    colour: float
+    hidden: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation, in the estimate's unit."""
+        return float(np.hypot(self.seen, self.hidden))
 
     def half(self, confidence: float, besides: float = 0.0) -> float:
         """Return half the width of the interval that covers the truth with a probability.
@@ -58,9 +63,11 @@ class Spread:
             confidence: the probability.
             besides: standard deviation of an error of another cause, in the estimate's unit.
         """
-        from scipy.special import stdtrit
+        from scipy.special import ndtri, stdtrit
 
-        return float(stdtrit(self.freedom, 0.5 + 0.5 * confidence) * np.hypot(self.deviation, besides))
+        upper = 0.5 + 0.5 * confidence
+        seen = stdtrit(self.freedom, upper) * np.hypot(self.seen, besides)
+        return float(np.hypot(seen, ndtri(upper) * self.hidden))
 
 
 class SpreadSums:
@@ -75,23 +82,28 @@ class SpreadSums:
         self.last = last
         self.errors = np.zeros(BINS)
         self.information = np.zeros(BINS)
+        self.hidden = 0.0
         self.fitted: list[Floats] = []
 
     def bins(self, time: Floats) -> Integers:
         """Return the bin of each time."""
         return np.clip((time - self.first) * (BINS / max(self.last - self.first, 1e-300)), 0, BINS - 1).astype(np.int64)
 
-    def add(self, bins: Integers, weight: Floats, residual: Floats, noise: float, columns: Floats) -> None:
+    def add(
+        self, bins: Integers, weight: Floats, residual: Floats, off_lines: Floats, noise: float, columns: Floats
+    ) -> None:
         """Take in the samples of one signal.
 
         Args:
             bins: (n,) of its samples.
             weight: (n,) the estimate's sensitivity to them.
             residual: (n,)
+            off_lines: (n,) how far what is interpolated may be off, which residuals may hide: they are fitted.
             noise: standard deviation of the residuals.
             columns: (p, n) orthonormal; what was fitted to this signal alone.
         """
         self.errors += np.bincount(bins, weight * residual, BINS)
+        self.hidden += float(((weight * off_lines) ** 2).sum())
         self.information += np.bincount(bins, (weight * noise) ** 2, BINS)
         self.fitted.extend(np.asarray(np.bincount(bins, weight * noise * column, BINS)) for column in columns)
 
@@ -103,7 +115,7 @@ class SpreadSums:
         """
         total = float(self.information.sum())
         if not total > 0.0:
-            return Spread(0.0, float(COSINES), 1.0)
+            return Spread(0.0, float(COSINES), 0.0)
         u = (np.cumsum(self.information) - 0.5 * self.information) / total
         cosines = np.cos(np.pi * np.arange(1, COSINES + 1)[:, None] * u)
         seen = (cosines * self.errors).sum(axis=1)
@@ -112,6 +124,7 @@ class SpreadSums:
         K -= np.einsum("pk,pl->kl", off, off)
         trace = float(np.trace(K))
         if not trace > 1e-9 * total:
-            return Spread(np.inf, 1.0, 1.0)
+            return Spread(np.inf, 1.0, 0.0)
         variance = float((seen**2).sum()) / trace * total
-        return Spread(float(np.sqrt(variance)), max(trace**2 / float(np.sum(K * K)), 1.0), variance / total)
+        freedom = max(trace**2 / float(np.sum(K * K)), 1.0)
+        return Spread(float(np.sqrt(variance)), freedom, float(np.sqrt(self.hidden)))

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.between import Places, slopes
+from replay.alignment.between import Places, line_errors, slopes
 from replay.alignment.clock import LogClock
 from replay.alignment.pair import SignalPair
 from replay.alignment.residuals import SampledFrames
 from replay.alignment.spread import BINS, SpreadSums
-from replay.alignment.trace import FEWEST, MOST, thinned
+from replay.alignment.trace import FEWEST, frames_of, samples_of
 
 PERCENTILES = (5.0, 50.0, 95.0)
 
@@ -109,12 +109,11 @@ def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFi
     Returns:
         None where fewer than 6 samples lie between frames with values, or where the simulated signal is constant.
     """
-    there = np.isfinite(pair.measured_value)
-    log_time, y = thinned(pair.measured_time[there], pair.measured_value[there], MOST)
-    if len(pair.time) < 2 or len(y) < FEWEST:
+    log_time, y = samples_of(pair)
+    time, simulated = frames_of(pair)
+    if len(time) < 2 or len(y) < FEWEST:
         return None
-    simulated = np.where(np.isfinite(pair.value), pair.value, np.nan)
-    places = Places(pair.time, clock.simulated(log_time))
+    places = Places(time, clock.simulated(log_time))
     s = places.values(simulated)
     used = places.inside & np.isfinite(s)
     n = int(used.sum())
@@ -135,12 +134,13 @@ def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFi
     to_scale = off / norm**2
     to_offset = 1.0 / n - mean * to_scale
     columns = np.array([np.full(n, 1.0 / np.sqrt(n)), off / norm])
-    slope = scale * slopes(pair.time, simulated / largest[0])[0][places.index[used]]
+    slope = scale * slopes(time, simulated / largest[0])[0][places.index[used]]
+    off_lines = scale * line_errors(simulated / largest[0])[places.index[used]]
     moves = slope, slope * (log_time - clock.reference)
     intervals = []
     for best, weight, unit in ((scale, to_scale, largest[1] / largest[0]), (offset, to_offset, largest[1])):
         sums = SpreadSums(float(log_time[0]), float(log_time[-1]))
-        sums.add(sums.bins(log_time), weight, residual, noise, columns)
+        sums.add(sums.bins(log_time), weight, residual, off_lines, noise, columns)
         of_offset, of_drift = (float((weight * move).sum()) for move in moves)
         of_clock = float(np.hypot(of_offset * clock.deviations[0], of_drift * clock.deviations[1]))
         half = sums.spread(np.zeros((0, BINS))).half(confidence, of_clock)

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.between import slopes
+from replay.alignment.between import line_errors, slopes
 from replay.alignment.pair import SignalPair
 from replay.numerics.arrays import Floats
 
 FEWEST = 6
 """Samples of a signal that are of use: two determine its scale and offset, two the clock."""
 
-MOST = 1 << 17
-"""Samples of a signal that the clock is found with; of more, as many neighbours as it takes are one, their mean."""
+MOST = 1 << 16
+"""Samples and frames that a clock is found with; of more, as many neighbours as it takes are one, their mean."""
 
 _MOVES = 1e-9
 """A signal that varies by less than this part of its size is constant: that is rounding."""
@@ -33,6 +33,7 @@ class Trace:
         slopes: (n,) slopes at frames [1/s].
         log_time: (m,) of the samples [s], on the log's clock.
         measured: (m,) of mean 0 and standard deviation 1.
+        bends: (n - 1,) how far each line between frames may be off, see `line_errors`.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Trace:
     slopes: Floats
     log_time: Floats
     measured: Floats
+    bends: Floats
 
     def thinned(self, most: int) -> Trace:
         """Return a trace of fewer samples, see `thinned`."""
@@ -64,33 +66,55 @@ def thinned(time: Floats, value: Floats, most: int) -> tuple[Floats, Floats]:
     return times.mean(axis=1)[near], values.mean(axis=1)[near]
 
 
-def trace_of(pair: SignalPair) -> Trace | str:
-    """Return the trace of a pair, or why it says nothing about the clock."""
-    there = np.isfinite(pair.measured_value)
-    log_time, measured = pair.measured_time[there], pair.measured_value[there]
+def trace_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> Trace | str:
+    """Return the trace of a pair, or why it says nothing about the clock.
+
+    Args:
+        pair: the signals.
+        first, last: samples of other times are left out [s]: logs may be long, or have a time that is far off.
+    """
+    log_time, measured = samples_of(pair, first, last)
     frames = int(np.isfinite(pair.value).sum())
     if frames < FEWEST:
         return f"{frames} of {len(pair.value)} frames have a simulated value"
     if len(measured) < FEWEST:
-        return f"{len(measured)} of {len(pair.measured_value)} samples have a measured value"
-    value = np.where(np.isfinite(pair.value), pair.value, np.nan)
+        return (
+            f"{len(measured)} of {len(pair.measured_value)} samples have a value, at times that may be the scenario's"
+        )
+    time, value = frames_of(pair)
     if pair.steps:
-        value = _softened(pair.time, value, float(np.median(np.diff(log_time))))
+        value = _softened(time, value, float(np.median(np.diff(log_time))))
     simulated, taken = _of_size_one(value), _of_size_one(measured)
     if simulated is None:
         return "the simulated signal is constant"
     if taken is None:
         return "the measured signal is constant"
-    lines, at_frames = slopes(pair.time, simulated)
-    return Trace(pair.name, pair.time, simulated, lines, at_frames, log_time, taken).thinned(MOST)
+    lines, at_frames = slopes(time, simulated)
+    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, line_errors(simulated))
+
+
+def frames_of(pair: SignalPair) -> tuple[Floats, Floats]:
+    """Return times and simulated values, NaN where there is no number, of `MOST` frames at most."""
+    value = pair.value
+    if np.isinf(value).any():
+        value = np.where(np.isfinite(value), value, np.nan)
+    return thinned(pair.time, value, MOST)
+
+
+def samples_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> tuple[Floats, Floats]:
+    """Return times and measured values of those samples, between two times, that are numbers, `MOST` at most."""
+    begin, end = np.searchsorted(pair.measured_time, [first, last])
+    time, value = pair.measured_time[begin:end], pair.measured_value[begin:end]
+    there = np.isfinite(value)
+    return thinned(time, value, MOST) if there.all() else thinned(time[there], value[there], MOST)
 
 
 def _softened(time: Floats, value: Floats, interval: float) -> Floats:
-    """Return a signal of steps with ramps as long as the samples are apart, so that one sample at least lies on each.
+    """Return a signal of steps with ramps of twice the time between samples, so that some samples lie on each.
 
     A step between two frames is half-way between them in the mean, where the middle of the ramp is.
     """
-    half = int(interval / (2.0 * float(np.median(np.diff(time)))))
+    half = int(np.ceil(interval / float(np.median(np.diff(time)))))
     there = np.isfinite(value)
     sums = np.append(0.0, np.cumsum(np.where(there, value, 0.0)))
     counts = np.append(0, np.cumsum(there))
