@@ -1,4 +1,4 @@
-"""A recording beside what the machine measured, as a rerun recording: the scene, both curves of each signal, residuals."""
+"""A recording beside what the machine measured, as a rerun recording: the scene, curves of both, residuals."""
 
 from __future__ import annotations
 
