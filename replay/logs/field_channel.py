@@ -179,9 +179,13 @@ class FieldChannel:
         return skipped
 
     def samples(self, path: str) -> tuple[Integers, Floats]:
-        """Return times and values of a field, as they come."""
-        there = _joined(self.there[path], np.bool_) & self.used
-        return self.time[there], _joined(self.values[path], np.float64)[there]
+        """Return times and values of a field, as they come, once: nothing of it is kept here.
+
+        Where every message has the field, its times are those of the channel, for all such fields the same array.
+        """
+        there = _joined(self.there.pop(path), np.bool_) & self.used
+        value = _joined(self.values.pop(path), np.float64)
+        return (self.time, value) if there.all() else (self.time[there], value[there])
 
 
 def _cell_of(shape: MessageShape, path: FieldPath) -> _Cell | None:

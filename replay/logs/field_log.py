@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from replay.errors import RecordingError
 from replay.logs.excerpt import EXCERPT, write_messages
 from replay.logs.field_channel import FieldChannel
 from replay.logs.field_path import FieldPath
-from replay.logs.joint_log import Series, unrepeated
+from replay.logs.joint_log import unrepeated
 from replay.logs.mcap_chunks import MessageRun
 from replay.logs.message_log import Message, MessageLog
 from replay.numerics.arrays import Flags, Floats, Integers
@@ -26,11 +25,24 @@ _BATCH = 512
 
 
 @dataclass(frozen=True, eq=False)
+class FieldSeries:
+    """One value of a log over time.
+
+    Attributes:
+        time: (n,) int64 [ns] as the log counts it, increasing; fields of the same messages may share it.
+        value: (n,) in the log's unit; what is no number is NaN.
+    """
+
+    time: Integers
+    value: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class FieldLog:
     """Some values of a log over time.
 
     Attributes:
-        series: by place, in the order of time, no time twice; values in the log's unit, those that are no number NaN.
+        series: by place.
         begin: time [ns] of the first sample of whichever.
         left_out: leading samples that were left out: their stamps are 0, as before a clock is there.
         cut: given a window, None for all, and a note on where they come from, returns a file that reads as the
@@ -38,7 +50,7 @@ class FieldLog:
         origin: the note that a log carries which was cut out of another one; else empty.
     """
 
-    series: Mapping[Place, Series]
+    series: Mapping[Place, FieldSeries]
     begin: int
     left_out: int
     cut: Callable[[Window | None, Mapping[str, str]], bytes]
@@ -140,28 +152,25 @@ def in_window(time: Integers, window: Window | None, begin: int) -> Flags:
     return kept | (time == later.min()) if len(later) else kept
 
 
-def _series(name: str, topic: str, path: str, takers: Sequence[FieldChannel]) -> Series:
+def _series(name: str, topic: str, path: str, takers: Sequence[FieldChannel]) -> FieldSeries:
     parts = [taker.samples(path) for taker in takers]
-    time = _joined([part[0] for part in parts], np.int64)
+    time, value = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
     if not len(time):
         raise RecordingError(name, f"topic {topic!r} has no message with a field {path!r}")
-    return in_order(name, f"topic {topic!r}, field {path!r}", time, _joined([part[1] for part in parts], np.float64))
+    return in_order(name, f"topic {topic!r}, field {path!r}", time, value)
 
 
-def in_order(name: str, what: str, time: Integers, value: Floats) -> Series:
+def in_order(name: str, what: str, time: Integers, value: Floats) -> FieldSeries:
     """Return samples in the order of time, each once; RecordingError where there are two values for one moment."""
+    if (time[1:] > time[:-1]).all():
+        return FieldSeries(time, value)
     order = np.argsort(time, kind="stable")
-    time, value = time[order], value[order] + 0.0
-    if (time[1:] == time[:-1]).any():
-        kept = unrepeated(time, value)
-        time, value, order = time[kept], value[kept], order[kept]
-        twice = np.flatnonzero(time[1:] == time[:-1])
-        if len(twice):
-            at = int(twice[0])
-            both = f"{value[at]:.6g} and {value[at + 1]:.6g}"
-            raise RecordingError(name, f"{what} has two values at {time[at] / 1e9:.9g} s: {both}")
-    return Series(time, value, order)
-
-
-def _joined(parts: Sequence[Any], kind: Any) -> Any:
-    return np.concatenate(parts) if parts else np.zeros(0, dtype=kind)
+    time, value = time[order], value[order] + 0.0  # -0.0 and 0.0 are one value
+    kept = unrepeated(time, value)
+    time, value = time[kept], value[kept]
+    twice = np.flatnonzero(time[1:] == time[:-1])
+    if len(twice):
+        at = int(twice[0])
+        both = f"{value[at]:.6g} and {value[at + 1]:.6g}"
+        raise RecordingError(name, f"{what} has two values at {time[at] / 1e9:.9g} s: {both}")
+    return FieldSeries(time, value)

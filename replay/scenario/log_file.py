@@ -29,12 +29,14 @@ class LogFile:
         shown: what messages call it.
         sha256: of its file, or of the list of files of its folder.
         messages: a log of messages, or None: then `table` is one, in CSV.
+        data: of the file; empty of a folder.
     """
 
     shown: str
     sha256: str
     messages: MessageLog | None
     table: bytes = b""
+    data: bytes = b""
 
 
 def open_log(
@@ -68,9 +70,9 @@ def open_log(
     digest = hashlib.sha256(data).hexdigest()
     with reading(path):
         if messages:
-            return LogFile(shown, digest, open_message_log(shown, data))
+            return LogFile(shown, digest, open_message_log(shown, data), data=data)
         table = as_csv(shown, data) if kind in ENDINGS and not is_excerpt(data) else data
-        return LogFile(shown, digest, None, table)
+        return LogFile(shown, digest, None, table, data)
 
 
 def _open_folder(

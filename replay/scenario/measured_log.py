@@ -68,16 +68,26 @@ class MeasuredLog:
     problems: list[Problem] = field(default_factory=list)
     notes: list[Problem] = field(default_factory=list)
     origin: Mapping[str, str] = field(default_factory=dict)
-    _log: FieldLog | None = None
+    _cut: Callable[[Window | None, Mapping[str, str]], bytes] | None = None
     _window: Window | None = None
+    _file: LogFile | None = None
 
     def excerpt(self, recorded: RecordedMotion | None) -> bytes:
-        """Return a file with what the comparison needs of the log, and what a motion of the same log does."""
-        assert self._log is not None
-        own = self._log.cut(self._window, self.origin)
+        """Return a file with what the comparison needs of the log, and what a motion of the same log does.
+
+        What is an excerpt already stays as it is.
+        """
+        assert self._cut is not None
+        if self._file is not None:
+            return self._file.data
+        own = self._cut(self._window, self.origin)
         if recorded is None or not recorded.published:
             return own
         return joined(recorded.excerpt, own, lambda data: open_message_log(self.origin["name"], data))
+
+    def without_file(self) -> MeasuredLog:
+        """Return the same, without what an excerpt is made of: the log's file, which may be large."""
+        return MeasuredLog(self.series, self.begin, self.zero, self.problems, self.notes, self.origin)
 
 
 def read(
@@ -111,11 +121,16 @@ def read(
         found.notes.append(problem((*PATH, "file"), rule))
     found.origin = dict(log.origin) or {"name": name, "sha256": file.sha256}
     found.begin, found.zero = log.begin, log.begin if log.begin >= EPOCH else 0
-    found._log, found._window = log, _window(scenario, written, found.zero)
+    found._window = _window(scenario, written, found.zero)
+    found._file = file if log.origin else None
+    found._cut = log.cut
+    seconds: dict[int, Floats] = {}
     for signal, part in written.signals.items():
         series = log.series[places[signal]]
+        shared = seconds.setdefault(id(series.time), _seconds(series.time, found.zero, found._window))
         factor = _factor(unit_of(scenario, signal), part)
-        found.series[signal] = _converted(series.time, series.value, part, factor, found.zero, found._window)
+        value = series.value[_inside(series.time, found._window)]
+        found.series[signal] = MeasuredSeries(shared, _converted(value, part, factor))
     return found
 
 
@@ -183,11 +198,24 @@ def _factor(unit: str, part: MeasuredSignalPart) -> float:
     return float(dimension.units[part.unit or (headed if headed in dimension.units else dimension.si)])
 
 
-def _converted(
-    time: Integers, value: Floats, part: MeasuredSignalPart, factor: float, zero: int, window: Window | None
-) -> MeasuredSeries:
-    inside = slice(None) if window is None else slice(*np.searchsorted(time, [window[0], window[1] + 1]).tolist())
-    time, value = time[inside], value[inside]
-    nothing = ~np.isfinite(value) | np.isin(value, part.nothing)
-    value = np.where(nothing, np.nan, value if factor == 1.0 else value * factor)
-    return MeasuredSeries((time - zero) / 1e9, value)
+def _inside(time: Integers, window: Window | None) -> slice:
+    """Return which samples are in the time of interest."""
+    if window is None:
+        return slice(None)
+    first, last = np.searchsorted(time, [window[0], window[1] + 1]).tolist()
+    return slice(first, last)
+
+
+def _seconds(time: Integers, zero: int, window: Window | None) -> Floats:
+    seconds: Floats = (time[_inside(time, window)] - zero) / 1e9
+    return seconds
+
+
+def _converted(value: Floats, part: MeasuredSignalPart, factor: float) -> Floats:
+    """Return values in SI, NaN for those that stand for nothing."""
+    nothing = ~np.isfinite(value)
+    if part.nothing:
+        nothing |= np.isin(value, part.nothing)
+    if factor != 1.0:
+        value = value * factor
+    return np.where(nothing, np.nan, value) if nothing.any() else value

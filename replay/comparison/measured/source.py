@@ -118,7 +118,7 @@ def compare_scenario(
     path: str | Path, scenario: Scenario, source: MeasuredSource, *, rules: Rules | None = None
 ) -> MeasuredComparison:
     """Return what the recording of a scenario says beside a log of the machine; errors as of `compare_recording`."""
-    log = measured_log.read(scenario, source.written, source.library, source.name, source.problem)
+    log = measured_log.read(scenario, source.written, source.library, source.name, source.problem).without_file()
     if log.problems:
         raise ScenarioError(log.problems)
     with McapLog(path) as file:
