@@ -74,7 +74,8 @@ class Baseline:
                 shutil.rmtree(self._staging, ignore_errors=True)
                 self._put_in_place(self._stage(entries, reason, now))
             except OSError as error:
-                raise write_error(self.directory, error) from None
+                place = error.filename if isinstance(error.filename, str) else self.directory
+                raise write_error(Path(place), error) from None
             finally:
                 if not self._staged_line():
                     shutil.rmtree(self._staging, ignore_errors=True)
@@ -183,7 +184,11 @@ def check_name(name: str) -> None:
 
 def check_scenario(recording: Path, name: str) -> None:
     """Raise RecordingError unless a recording is a file, not a link to one, and of the scenario of that name."""
-    if recording.is_symlink() or recording.parent.is_symlink():
+    try:
+        linked = recording.is_symlink() or recording.parent.is_symlink()
+    except OSError as error:
+        raise RecordingError(str(recording), f"cannot be read: {error.strerror}") from None
+    if linked:
         raise RecordingError(str(recording), "is a link, or in a folder that is one, and not a file of the run")
     with McapLog(recording) as log:
         found = read_provenance(log).scenario
