@@ -178,7 +178,7 @@ def _ends_in(file: Path, data: bytes) -> bool:
 
 def check_name(name: str) -> None:
     """Raise InvalidValue unless a name, as a run.json may hold any, is one that scenarios and their folders have."""
-    if not is_title(name) or name == LOG:
+    if not is_title(name):
         raise InvalidValue("scenario", repr(name), "is no scenario's name, which is that of a folder and no path")
 
 

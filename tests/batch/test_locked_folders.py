@@ -50,6 +50,7 @@ def night(tmp_path_factory):
     assert (
         run(["regress", str(folder / "in"), "--baseline", str(folder / "base"), "-o", str(folder / "out"), *more]) == 0
     )
+    shutil.copytree(folder / "out", folder / "part")
     return folder
 
 
@@ -125,10 +126,10 @@ def test_meshes_further_up_are_found_behind_a_folder_that_may_not_be_looked_into
     assert (done.stdout, done.returncode) == ("a: valid, 3 frames, 3 links\n", ExitCode.FINE)
 
 
-@pytest.mark.parametrize("place", ["out/a", "out/run.json", "out/a/a.mcap"])
+@pytest.mark.parametrize("place", ["part/a", "part/run.json"])
 def test_parts_of_a_night_that_may_not_be_looked_into_are_neither_merged_nor_accepted(place, night, locked):
     locked(place)
-    arguments = [["merge", "out", "-o", "whole"], ["accept", "out", "--baseline", "base", "--yes", "--reason", "why"]]
+    arguments = [["merge", "part", "-o", "whole"], ["accept", "part", "--baseline", "base", "--yes", "--reason", "why"]]
     told = anybody(night, "-c", MANY, json.dumps(arguments)).stderr.splitlines()
     shutil.rmtree(night / "whole", ignore_errors=True)
     assert told[1::2] == ["2"] * len(arguments)
