@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from replay.errors import InvalidValue, RecordingError
 from replay.json_text import read_json_file
 from replay.language.fields import is_title
 from replay.logs.mcap_reader import McapLog
-from replay.logs.part_file import append_lines, json_line, refuse_link, write_error, write_file
+from replay.logs.part_file import append_lines, json_line, refuse_link, remove_folder, write_error, write_file
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, is_digest, write_slim
 
@@ -71,14 +70,14 @@ class Baseline:
             try:
                 if line := self._staged_line():
                     self._put_in_place(line)
-                shutil.rmtree(self._staging, ignore_errors=True)
+                remove_folder(self._staging)
                 self._put_in_place(self._stage(entries, reason, now))
             except OSError as error:
-                place = error.filename if isinstance(error.filename, str) else self.directory
-                raise write_error(Path(place), error) from None
+                named = Path(error.filename) if isinstance(error.filename, str) else self.directory
+                raise write_error(named, error) from None
             finally:
                 if not self._staged_line():
-                    shutil.rmtree(self._staging, ignore_errors=True)
+                    remove_folder(self._staging)
                 self._remove_unneeded()
                 with contextlib.suppress(OSError):
                     (self.directory / OBJECTS).rmdir()
