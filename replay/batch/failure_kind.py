@@ -1,8 +1,8 @@
 """Which failures are alike: what their messages say without what belongs to one scenario: paths, numbers, names.
 
-A message is taken word by word. A word of letters alone is part of what is said. Any other one (a number, a path, a key,
-a name with digits), what stands in quotes, and what has a value are particulars. Names of letters alone that stand without
-quotes cannot be told from words, but for the scenario's own.
+A message is taken word by word. A word of letters alone is part of what is said. Any other one (a number, a path,
+a name with digits), what stands in quotes, and what has a value are particulars. Names of letters alone that stand
+without quotes cannot be told from words, but for the scenario's own.
 """
 
 from __future__ import annotations
