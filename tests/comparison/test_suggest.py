@@ -7,7 +7,7 @@ import pytest
 from replay.comparison.difference import DiffVerdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.rules_file import read_rules
-from replay.comparison.runs import Case, RecordingPair, RunDifference, diff_pair
+from replay.comparison.runs import Case, RecordingPair, RunDifference, Unreadable, diff_pair
 from replay.comparison.suggest import MARK, round_up, suggest
 from tests.comparison import made_up
 from tests.comparison.changed import BASELINE, change, compared
@@ -67,3 +67,21 @@ def test_frames_that_only_one_run_has_are_a_comment_unless_a_rule_accepts_them(a
     lines = [line for line in suggest(found).splitlines() if "missing in the candidate" in line]
     assert len(lines) == (0 if accepted else 1)
     assert all(line.startswith('#   "made_up: 2 frames missing') for line in lines)
+
+
+def test_what_cannot_be_compared_is_a_comment():
+    """A scenario that nobody could read, and those of one run only, but for such as rules leave out."""
+    found = RunDifference(
+        "a",
+        "b",
+        (),
+        missing=("gone", "left"),
+        extra=("new",),
+        unreadable=(Unreadable("cut", Path("a"), Path("b"), "b/cut/cut.mcap: damaged: its end is missing"),),
+        ignored=("left",),
+    )
+    assert [line for line in suggest(found).splitlines() if line.startswith("#   ")] == [
+        '#   "scenario cut: b/cut/cut.mcap: damaged: its end is missing"',
+        '#   "scenario gone: in one run only"',
+        '#   "scenario new: in one run only"',
+    ]
