@@ -134,7 +134,7 @@ def test_a_free_body_that_slides_and_spins_above_a_plane_takes_few_queries(gap):
 def test_the_way_of_a_free_body_lies_in_its_joints_place_however_that_is_turned(gap, turn):
     """The place is turned about no axis of its own, so each of its nine numbers counts; the way is along the world's x.
 
-    A cube spins about z just above a plane, then the same just so deep that it touches: as in a place that is not turned.
+    A cube spins about z just above a plane, then just so deep that it touches: as in a place that is not turned.
     """
     axis = np.array([1.0, -2.0, 3.0]) / math.sqrt(14.0)
     place = transforms.from_axis_angle(axis, np.array(0.7))

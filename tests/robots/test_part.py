@@ -147,6 +147,17 @@ def test_pairs_in_one_rigid_part_and_of_the_srdf_are_disabled(tmp_path):
     assert "state out: joint cd at 9 is beyond its limits 0.5 and 3: left out" in told(done)
 
 
+def test_the_only_two_bodies_of_a_robot_may_be_a_disabled_pair(tmp_path):
+    done = imported(
+        tmp_path,
+        *(made.link(name, BOX) for name in ("a", "b")),
+        made.joint("ab", "a", "b", "revolute", TURN),
+        srdf='<disable_collisions link1="b" link2="a" reason="Never"/>',
+    )
+    assert done.part.disabled == [("a", "b", "Never")]
+    assert "without bodies" not in told(done)
+
+
 def test_limits_of_moveit_replace_those_of_the_description(tmp_path):
     (tmp_path / "limits.yaml").write_text(
         "joint_limits:\n"
