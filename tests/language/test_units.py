@@ -157,3 +157,11 @@ def test_a_quantity_takes_its_bounds_and_nothing_beyond(name, least, most, open_
             adapter.validate_python(math.inf)
     with pytest.raises(ValidationError):
         adapter.validate_python(math.nan)
+
+
+def test_a_quantity_has_four_hundred_characters_at_most():
+    parse = TypeAdapter(Length).validate_python
+    longest = "1." + "0" * 396 + " m"
+    assert len(longest) == 400 and parse(longest) == 1.0
+    with pytest.raises(ValidationError, match="is not a length"):
+        parse(longest.replace(" ", "  "))
