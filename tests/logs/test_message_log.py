@@ -1,7 +1,10 @@
 """Bags and folders of bags as logs of messages: what is damaged is told, in one line, and never a crash."""
 
+import io
+
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from replay.errors import RecordingError
 from replay.logs.joint_log import Choice, read_messages
@@ -74,6 +77,28 @@ def test_channels_that_have_another_id_in_the_next_file_are_the_same():
     log, _ = open_bag_folder("drive", {"metadata.yaml": LISTED, "a": parts[0], "b": camera, "c": parts[1]}.__getitem__)
     assert sorted(channel.topic for channel in log.channels.values()) == ["/camera", "/joint_states"]
     assert positions(log) == TRUTH
+
+
+def test_a_topic_without_a_schema_has_none_in_a_split_bag_either():
+    """Its number in the joined log is free, and must be no other topic's schema."""
+
+    def plain(time):
+        stream = io.BytesIO()
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/note", "json", 0)
+        writer.add_message(channel, time, b'{"a": 1}', time)
+        writer.finish()
+        return stream.getvalue()
+
+    joints = made_logs.mcap(SAID)
+    for parts in ((joints, plain(1), plain(2)), (plain(1), joints, plain(2)), (plain(1), plain(2), joints)):
+        files = {"metadata.yaml": LISTED, **dict(zip("abc", parts, strict=True))}
+        log, _ = open_bag_folder("drive", files.__getitem__)
+        schemas = {channel.topic: log.schema(channel) for channel in log.channels.values()}
+        assert sorted(schemas) == ["/joint_states", "/note"] and len(log.channels) == 2
+        assert schemas["/note"] is None
+        assert positions(log) == TRUTH
 
 
 LISTED = b"rosbag2_bagfile_information:\n  relative_file_paths: [a, ../drive/b, c]\n"
