@@ -97,6 +97,15 @@ def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[lis
     return result, left_out
 
 
+def standing_at(root: Path, places: Sequence[str]) -> list[Mutation]:
+    """Return all mutations of lines, given as "replay/room/module.py:12"."""
+    result: list[Mutation] = []
+    for file, _, line in (place.rpartition(":") for place in places):
+        source = (root / file).read_text(encoding="utf-8")
+        result += [m for m in mutations_of(file, source) if m.line == int(line) and is_python(m.applied_to(source))]
+    return result
+
+
 def try_mutation(mutation: Mutation, tree: Tree, reach: Reach, plain: Plain, budget: float) -> tuple[Outcome, str]:
     """Return what became of a mutation and how its kernels were run.
 
@@ -158,7 +167,9 @@ class Plain:
 
 def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     """Try the chosen mutations, tell the survivors and the figure by room; return whether enough are noticed."""
-    mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
+    mutations, left_out = standing_at(tree.root, options.place), {}
+    if not options.place:
+        mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
     reach = Reach(tree, Targets(tree.root), work / "reach")
     plain = Plain(tree, work / "plain.json")
     results = _results(work / "results.jsonl", again=options.again)
@@ -243,6 +254,9 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=330, help="mutants over all rooms")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--room", action="append", default=[], help="only this room's share; may be repeated")
+    parser.add_argument(
+        "--place", action="append", default=[], metavar="FILE:LINE", help="all mutants of a line instead"
+    )
     parser.add_argument("--budget", type=float, default=40.0, help="seconds of tests that are asked about one mutant")
     parser.add_argument("--again", action="store_true", help="try survivors of an earlier run again")
     parser.add_argument("--planted", nargs="*", metavar="NAME", help="the faults of planted.yaml instead, or some")

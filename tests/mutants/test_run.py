@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutants.mutations import Mutation, is_python, mutations_of
-from tests.mutants.run import CHECKOUT, equivalents, planted_faults
+from tests.mutants.run import CHECKOUT, equivalents, planted_faults, standing_at
 from tests.mutants.targets import Targets
 
 SOURCE = '''"""Docstring 1 < 2."""
@@ -77,6 +77,13 @@ def test_every_kind_of_slip_is_found_where_it_can_be_noticed_and_nowhere_else():
     assert [m.id for m in moved] == [m.id for m in found]
     with pytest.raises(ValueError, match="is not what it was"):
         found[0].applied_to("\n" + SOURCE)
+
+
+def test_all_mutants_of_a_line_can_be_asked_for():
+    place = "replay/__init__.py:71"
+    found = standing_at(CHECKOUT, [place])
+    assert {(m.file, m.line) for m in found} == {("replay/__init__.py", 71)}
+    assert {m.kind for m in found} >= {"and/or", "not"}
 
 
 def test_alike_places_of_a_file_have_different_names():
