@@ -1,13 +1,15 @@
 """Bags and folders of bags as logs of messages: what is damaged is told, in one line, and never a crash."""
 
 import io
+import itertools
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
 
 from replay.errors import RecordingError
 from replay.logs.joint_log import Choice, read_messages
+from replay.logs.mcap_records import Schema
+from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.message_log import open_bag_folder, open_message_log
 from tests.logs import made_logs
 from tests.logs.made_logs import Said
@@ -79,26 +81,27 @@ def test_channels_that_have_another_id_in_the_next_file_are_the_same():
     assert positions(log) == TRUTH
 
 
-def test_a_topic_without_a_schema_has_none_in_a_split_bag_either():
-    """Its number in the joined log is free, and must be no other topic's schema."""
+@pytest.mark.parametrize("number", [0, 1, 7])
+def test_a_topic_without_a_schema_has_none_in_a_split_bag_either(number):
+    """Whatever numbers channels have, it must get no other topic's schema."""
 
-    def plain(time):
+    def part(time, schema=None):
         stream = io.BytesIO()
-        writer = Writer(stream)
-        writer.start()
-        channel = writer.register_channel("/note", "json", 0)
-        writer.add_message(channel, time, b'{"a": 1}', time)
+        writer = McapFileWriter(stream, "made")
+        known = writer.schema(schema) if schema else 0
+        writer.channel("/typed" if schema else "/note", known, encoding="json", number=number)
+        writer.end_preamble()
+        writer.messages(number, [time], [0], [b'{"a": 1}'])
         writer.finish()
         return stream.getvalue()
 
-    joints = made_logs.mcap(SAID)
-    for parts in ((joints, plain(1), plain(2)), (plain(1), joints, plain(2)), (plain(1), plain(2), joints)):
+    schema = Schema("Any", "jsonschema", b"{}")
+    for parts in itertools.permutations((part(1), part(2), part(3, schema))):
         files = {"metadata.yaml": LISTED, **dict(zip("abc", parts, strict=True))}
         log, _ = open_bag_folder("drive", files.__getitem__)
+        assert len(log.channels) == 2
         schemas = {channel.topic: log.schema(channel) for channel in log.channels.values()}
-        assert sorted(schemas) == ["/joint_states", "/note"] and len(log.channels) == 2
-        assert schemas["/note"] is None
-        assert positions(log) == TRUTH
+        assert schemas == {"/typed": schema, "/note": None}
 
 
 LISTED = b"rosbag2_bagfile_information:\n  relative_file_paths: [a, ../drive/b, c]\n"
