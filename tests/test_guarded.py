@@ -11,6 +11,7 @@ import pytest
 import replay
 from replay import guarded, simulation
 from replay.batch.case import CaseOrder, CaseStatus, describe, run_case
+from replay.batch.run import Execution, run_all
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.comparison.effects import effects
@@ -307,6 +308,20 @@ def test_sweeps_over_guards(tmp_path: Path) -> None:
     assert slow.name == "cart[reaction=100ms]"
     ends = [columns(made)["positions"][-1, 0] for made in (fast, slow)]
     assert ends[1] - ends[0] == pytest.approx(0.03, rel=1e-9)
+
+
+def test_recordings_with_guards_are_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
+    grid = "sweep: {grid: {guards.stop.reaction: [0 ms, 100 ms], sensors.distance.tip.signal.noise.seed: [1, 2]}}\n"
+    path = tmp_path / "cart.yaml"
+    path.write_bytes(sources(SEVERAL, signal=NOISE, duration="4 s", more=grid)["cart.yaml"])
+    cases = load_cases(path)
+    recordings = []
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        assert run_all(cases, folder, rrd=False, execution=Execution(workers=workers)).passed
+        recordings.append([(folder / made.name / f"{made.name}.mcap").read_bytes() for made in cases])
+    assert recordings[0] == recordings[1]
+    assert len(set(recordings[0])) == 4
 
 
 def test_the_protective_separation_follows_the_speed() -> None:
