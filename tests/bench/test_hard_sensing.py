@@ -23,10 +23,10 @@ def made(family):
     return triangles, axes, apertures, normals * np.sign(np.sum(normals * triangles[:, 0], axis=1))[:, None]
 
 
-def spans(values, low, high):
-    """Whether values lie between two and reach at least two thirds of the powers of ten, from both ends."""
+def spans(values, low, high, share=1 / 16):
+    """Whether values lie between two, and come near both: by a share of the powers of ten between these."""
     logs = np.log10([low, *np.abs(values), high])
-    margin = (logs[-1] - logs[0]) / 6.0
+    margin = share * (logs[-1] - logs[0])
     inner = logs[1:-1]
     return (
         inner.min() >= logs[0] - 1e-9
@@ -64,7 +64,7 @@ def test_triangles_are_as_large_and_as_thin_as_they_are_called():
     assert max(thin) < 1e-2 and min(thin) < 1e-10 and np.median(thin) < 1e-6
     triangles, axes, apertures, _ = made("small, at the cone's border")
     size = np.linalg.norm(triangles - triangles.mean(axis=1)[:, None], axis=2).max(axis=1)
-    assert spans(size, 1e-6, 0.3)
+    assert spans(size, 1e-6, 0.3, share=1 / 4)
     centre = triangles.mean(axis=1)
     angle = np.arccos(np.sum(centre * axes, axis=1) / np.linalg.norm(centre, axis=1))
     assert np.median(np.abs(angle - 0.5 * apertures) / size) < 1.5

@@ -49,6 +49,18 @@ def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
         assert diff_pair(pair, rules=Rules(tuple(others))).verdict is DiffVerdict.DIFFERENT
 
 
+def test_what_a_present_rule_says_of_nan_and_zero_is_kept():
+    def calm(recording):
+        recording.joint_positions[20, 0] += 1e-3
+
+    rule = Rule(("/joint_states/position/lift",), Tolerance(abs=1e-9, nan="fail", zero="signed"), "as it is")
+    pair = RecordingPair(BASELINE, made_up.altered(BASELINE, calm))
+    for rules, kept in ((Rules((rule,)), ["nan: fail", "zero: signed"]), (None, [])):
+        found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=rules)),))
+        lines = [line.strip() for line in suggest(found).splitlines()]
+        assert [line for line in lines if line.startswith(("nan:", "zero:"))] == kept
+
+
 def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
     found, _ = compared()
     path = tmp_path / "rules.yaml"
