@@ -15,6 +15,7 @@ from replay.batch.case_folder import LOG
 from replay.batch.drawings import Album
 from replay.batch.finding import Finding
 from replay.batch.judged import OVERLAY, PAGE, Judged, RegressVerdict
+from replay.batch.raised import told
 from replay.batch.report_case import case_page
 from replay.comparison import wording
 from replay.comparison.causes import Causes, causes
@@ -216,4 +217,4 @@ def _odd(what: str, error: Exception, candidate: Path) -> str:
     with contextlib.suppress(ReplayError):
         trace = "".join(traceback.format_exception(error)).splitlines()
         append_lines(candidate.with_name(LOG), map(printable, trace))
-    return f"{what}: {type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{what}: {told(error)}"

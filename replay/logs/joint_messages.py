@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -258,9 +258,3 @@ def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError(f"the name of a joint is {json.dumps(value)[:60]}, no text")
     return value
-
-
-def is_of(channel: Channel, schema: Schema | None, kinds: Iterable[str]) -> bool:
-    """Return whether a channel may hold messages of these kinds: by its schema, or JSON without one that says."""
-    kind = kind_of(schema)
-    return kind in kinds or (channel.encoding == "json" and kind not in JOINTS + TRANSFORMS)
