@@ -82,6 +82,14 @@ links:
   arm: {parent: base, joint: {name: swing, type: revolute, axis: [0, 1, 0]}}
 motion: {recorded: {file: FILE}}
 """
+MEASURED = (
+    RECORDED.partition(b"motion:")[0]
+    + b"""measured:
+  file: FILE
+  signals: {/joint_states/position/swing: PLACE}
+"""
+)
+PLACES = {"log.csv": b"{column: swing, nothing: -1}", "log.mcap": b"{topic: /joint_states, field: 'position[swing]'}"}
 NIGHT = {"time": "2024-01-01T00:00:00+00:00", "version": "0.1", "failing": ["b"], "verdicts": {"a": "same", "b": "x"}}
 RUN = {
     "replay": "0.1.0",
@@ -139,6 +147,8 @@ class House:
             "model": Door(15, self._text("model.yaml", MODEL), lambda f: load_model(f / "model.yaml")),
             "rules": Door(15, self._text("rules.yaml", RULES), self._enter_rules),
             "csv": Door(50, lambda rng: {"log.csv": d.of_text(self._csv, rng)}, self._motion("log.csv")),
+            "measured csv": Door(20, lambda rng: {"log.csv": d.of_text(self._csv, rng)}, self._measured("log.csv")),
+            "measured log": Door(10, self._make_log, self._measured("log.mcap")),
             "curve": Door(40, self._text("curve.csv", b"distance_cm,output_V\n1,2.0\n2,2.1\n3,2.2\n"), self._curve),
             "document": Door(40, lambda rng: {"log.json": d.of_json(self._document, rng)}, self._motion("log.json")),
             "parquet": Door(
@@ -198,6 +208,10 @@ class House:
 
     def _motion(self, name: str) -> Callable[[Path], object]:
         text = RECORDED.replace(b"FILE", name.encode())
+        return lambda folder: load_sources("again.yaml", {"again.yaml": text, name: (folder / name).read_bytes()})
+
+    def _measured(self, name: str) -> Callable[[Path], object]:
+        text = MEASURED.replace(b"FILE", name.encode()).replace(b"PLACE", PLACES[name])
         return lambda folder: load_sources("again.yaml", {"again.yaml": text, name: (folder / name).read_bytes()})
 
     def _export(self, name: str) -> Callable[[Path], object]:
