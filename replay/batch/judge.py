@@ -86,7 +86,7 @@ class Judge:
         if not result.status.recorded or result.recordings is None:
             return self.failed(result, scenario.tags)
         item, case, drawn = self._compared(scenario, result)
-        item, machine = self._beside_machine(scenario, item)
+        item, machine = self._beside_machine(scenario, item, case)
         if result.status is CaseStatus.BROKEN and item.verdict in _KNOWN:
             if case is not None and item.finding is not None and not item.finding.count:  # it may be expected anew
                 item = dataclasses.replace(item, finding=Finding(case.baseline, causes=_why(case)[0]))
@@ -95,7 +95,9 @@ class Judge:
             item = dataclasses.replace(item, verdict=RegressVerdict.BROKEN, message=message)
         return self._with_page(dataclasses.replace(item, tags=scenario.tags), case, drawn, machine)
 
-    def _beside_machine(self, scenario: Scenario, item: Judged) -> tuple[Judged, MeasuredComparison | None]:
+    def _beside_machine(
+        self, scenario: Scenario, item: Judged, case: Case | None
+    ) -> tuple[Judged, MeasuredComparison | None]:
         """Return the verdict with what the machine's log says, if the scenario names one; a failure stays one."""
         source = MeasuredSource.of_scenario(scenario)
         if source is None or item.result is None or item.result.recordings is None:
@@ -103,15 +105,19 @@ class Judge:
         found: MeasuredComparison | None = None
         try:
             found = compare_scenario(item.result.recordings.mcap, scenario, source, rules=self._rules)
-        except ReplayError as error:
-            verdict, told = RegressVerdict.FAILED, str(error)
+        except Exception as error:
+            told = _odd("it cannot be compared with the machine", error, item.result.recordings.mcap)
+            verdict = RegressVerdict.FAILED
         else:
             if found.verdict is not DiffVerdict.DIFFERENT:
                 return item, found
             verdict, told = RegressVerdict.DIFFERENT, f"beside the machine: {worst(found)}"
-            if item.finding is not None:
-                report = "\n".join([*filter(None, [item.finding.report]), *lines(found)])
-                item = dataclasses.replace(item, finding=item.finding.with_effects(effects_of(found), report))
+            finding = item.finding
+            if finding is not None and case is not None:
+                if not finding.count:  # until now nobody asked what has changed
+                    finding = Finding(case.baseline, causes=_why(case)[0])
+                report = "\n".join([*filter(None, [finding.report]), *lines(found)])
+                item = dataclasses.replace(item, finding=finding.with_effects(effects_of(found), report))
         message = "; ".join(filter(None, [item.message, told]))
         kept = item.verdict if not item.verdict.fine and item.verdict is not RegressVerdict.DIFFERENT else verdict
         return dataclasses.replace(item, verdict=kept, message=message), found

@@ -51,6 +51,7 @@ def test_further_from_reality_is_different_although_the_baseline_is_the_same(nig
     assert told["off"] is ExitCode.DIFFERENT
     assert verdict(folder, "off")["message"].startswith("beside the machine: measured ")
     assert verdict(folder, "off")["finding"]["effects"][0]["subject"] == "/distance/tip/distance"
+    assert any("run.csv" in line for line in verdict(folder, "off")["finding"]["causes"]["inputs"])
     assert "best fit: measured = 1.0" in (folder / "off" / "junit.xml").read_text()
 
 
