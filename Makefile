@@ -93,6 +93,8 @@ pictures: $(VENV)/.test system  ## make the README's pictures, most of them from
 	$(BIN)/replay diff $(RECORDINGS)/.thesis $(RECORDINGS)/.ours --rules scenarios/rules.yaml --html $(RECORDINGS)/.html || test $$? = 1
 	$(BIN)/python -m tests.pictures signal $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/thesis_and_ours.png
 	$(BIN)/python -m tests.pictures reaction $(RECORDINGS) scenarios/pictures/reaction_time.png
+	$(BIN)/replay compare scenarios/carm_parking_measured.yaml --html $(RECORDINGS)/.html
+	$(BIN)/python -m tests.pictures signal $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/beside_the_machine.png
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak
