@@ -9,13 +9,16 @@ import numpy as np
 
 from replay.alignment.between import line_errors, slopes
 from replay.alignment.pair import SignalPair
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Flags, Floats
 
 FEWEST = 6
 """Samples of a signal that are of use: two determine its scale and offset, two the clock."""
 
 MOST = 1 << 16
 """Samples and frames that a clock is found with; of more, as many neighbours as it takes are one, their mean."""
+
+_MOST_OF = (5.0, 95.0)
+"""Percentiles between which most values of a signal are."""
 
 _MOVES = 1e-9
 """A signal that varies by less than this part of its size is constant: that is rounding."""
@@ -82,6 +85,8 @@ def trace_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> 
             f"{len(measured)} of {len(pair.measured_value)} samples have a value, at times that may be the scenario's"
         )
     time, value = frames_of(pair)
+    likely = _likely(value, measured)
+    log_time, measured = log_time[likely], measured[likely]
     if pair.steps:
         value = _softened(time, value, float(np.median(np.diff(log_time))))
     simulated, taken = _of_size_one(value), _of_size_one(measured)
@@ -107,6 +112,19 @@ def samples_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -
     time, value = pair.measured_time[begin:end], pair.measured_value[begin:end]
     there = np.isfinite(value)
     return thinned(time, value, MOST) if there.all() else thinned(time[there], value[there], MOST)
+
+
+def _likely(value: Floats, measured: Floats) -> Flags:
+    """Return which measured values are not farther from most than simulated ones are, by the width of most and more.
+
+    A single value that is far off, as loggers have them, outweighs all others in a sum of squares. Most are those
+    between the first and the last twentieth.
+    """
+    low, high = np.nanpercentile(value, _MOST_OF)
+    beyond = max(low - np.nanmin(value), np.nanmax(value) - high) / (high - low) if high > low else np.inf
+    first, last = np.percentile(measured, _MOST_OF)
+    far = (1.0 + beyond) * (last - first) if last > first else np.inf
+    return np.asarray((measured >= first - far) & (measured <= last + far))
 
 
 def _softened(time: Floats, value: Floats, interval: float) -> Floats:

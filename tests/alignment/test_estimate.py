@@ -254,6 +254,17 @@ def test_times_that_are_far_off_do_not_matter():
     assert clock.offset_interval[0] <= 0.4 <= clock.offset_interval[1]
 
 
+@pytest.mark.parametrize("rate", [9.0, 100.0])
+def test_single_values_far_off_do_not_matter(rate):
+    pair = pair_of(hill, np.arange(0.0, 6.0, 1.0 / rate), 0.4, noise=0.1)
+    spoilt = pair.measured_value.copy()
+    spoilt[[7, len(spoilt) // 2]] = 50.0, -1e6
+    clock = told([dataclasses.replace(pair, measured_value=spoilt)])
+    half = 0.5 * np.diff(clock.offset_interval)[0]
+    assert abs(clock.offset - told([pair]).offset) < half
+    assert clock.offset_interval[0] <= 0.4 <= clock.offset_interval[1]
+
+
 def test_the_same_logs_give_the_same_numbers_whatever_their_unit():
     pair = pair_of(hill, np.arange(0.0, 6.0, 0.01), 0.1, noise=0.1)
     clock = told([pair])
