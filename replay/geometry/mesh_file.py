@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import stat
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -43,9 +44,11 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         raise MeshError(name, f"the file ending {Path(path).suffix!r} is not one of {', '.join(FORMATS)}")
     if data is None:
         try:
-            size = Path(path).stat().st_size
-            if size > limits.FILE:
-                raise MeshError(name, f"has {size} bytes; at most {limits.FILE} are read")
+            found = Path(path).stat()
+            if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+                raise MeshError(name, "is a pipe or a device; meshes are read from files")
+            if found.st_size > limits.FILE:
+                raise MeshError(name, f"has {found.st_size} bytes; at most {limits.FILE} are read")
             data = Path(path).read_bytes()
         except OSError as error:
             raise MeshError(name, error.strerror or "cannot be read") from error

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,7 +112,10 @@ def read_curve(
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     """Return the cells of every line that is not a remark, with the line's number, up to the last one with content."""
     try:
-        if path.stat().st_size > limits.TEXT_LOG:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+            raise CurveError(str(path), None, "is a pipe or a device; curves are read from files")
+        if found.st_size > limits.TEXT_LOG:
             raise CurveError(str(path), None, f"has more than {limits.TEXT_LOG} bytes")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:

@@ -1,6 +1,7 @@
 """Mesh files: what is whole is read wholly, and what is not is refused in one clear line, never read in part."""
 
 import json
+import os
 import re
 import struct
 
@@ -341,3 +342,10 @@ def test_of_a_file_that_is_too_large_nothing_is_read(tmp_path):
         stream.truncate(1 << 40)
     with pytest.raises(MeshError, match="has 1099511627776 bytes; at most 1073741824 are read"):
         read_faces(file)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices as POSIX has them")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.stl")
+    with pytest.raises(MeshError, match="is a pipe or a device"):
+        read_faces(tmp_path / "a.stl")

@@ -1,5 +1,8 @@
 """Measured curves: what is read, and every way in which a file can be wrong, with its line."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -77,3 +80,9 @@ def test_one_of_several_curves_is_picked_by_its_cells(tmp_path):
         read_curve(path, where={"side": "5"})
     with pytest.raises(CurveError, match="cannot be both"):
         read_curve(path, x="c_pF", y="c_pF")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices as POSIX has them")
+def test_a_device_is_not_read_without_end():
+    with pytest.raises(CurveError, match="is a pipe or a device"):
+        read_curve(Path("/dev/zero"))
