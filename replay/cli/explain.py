@@ -19,8 +19,8 @@ from replay.cli.values import PathName
 def explain(recording: Path, signal: str, at: float, slow: bool) -> ExitCode:
     """Say why SIGNAL of RECORDING (.mcap) is what it is: poses, what is closest, shares, and what other methods say.
 
-    SIGNAL is a sensor's topic (/distance/tip), a pair (/collision/arm/rod|table/top), or a signal of one as `replay
-    diff` names it.
+    SIGNAL is a sensor (/distance/tip or tip), a pair (/collision/arm/rod|table/top or arm/rod|table/top), or a signal
+    of one as `replay diff` names it.
     """
     from replay.comparison.explain import explain as explained
 

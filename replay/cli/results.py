@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from replay.cli import interruption
 from replay.cli.exit_codes import ExitCode, worst
-from replay.cli.options import say
+from replay.cli.options import note, say
 from replay.cli.terminal import put
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def exit_code(run: Run) -> ExitCode:
 
 def report(found: Regression, *, history: Path | None) -> ExitCode:
     """Write a regression's reports and say what became of it; return what the shell is told."""
-    from replay.batch.judged import INDEX
+    from replay.batch.judged import INDEX, RegressVerdict
     from replay.batch.reports import describe, write_reports
 
     interruption.settle()
@@ -67,6 +67,9 @@ def report(found: Regression, *, history: Path | None) -> ExitCode:
         lines.append(f"report: {found.run.directory / INDEX}")
     finally:
         put(lines)
+    if found.count(RegressVerdict.MISSING):
+        run, baseline = found.run.directory, found.baseline
+        note(f"`replay accept {run} --baseline {baseline} --reason WHY` stores what has no baseline yet")
     interrupted = ExitCode.INTERRUPTED if found.run.interrupted else ExitCode.FINE
     invalid = ExitCode.INVALID if any(result.invalid for result in found.run.results) else ExitCode.FINE
     return worst([interrupted, invalid, *(exit_code_of(item.verdict.name) for item in found.judged)])

@@ -30,7 +30,8 @@ def trend(
     if not history.is_file():
         raise click.UsageError(f"--history {history}: is not there; `replay regress` writes OUTPUT/history.jsonl")
     found = read_trend(history, measures=metrics, scenarios=scenarios)
-    options.say(form, lambda: table(found), lambda: as_json(found))
+    if found.curves or form == "json":
+        options.say(form, lambda: table(found), lambda: as_json(found))
     if html is not None:
         write_file(html, page(found), named=True)
     if not found.curves:

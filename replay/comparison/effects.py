@@ -214,12 +214,13 @@ def _sensor(items: Sequence[SignalDifference]) -> tuple[Severity, SignalDifferen
 
 
 def _motion(items: Sequence[SignalDifference]) -> tuple[SignalDifference, str]:
-    """Return what moves most differently: a joint where one does, else a link."""
+    """Return what moves most differently: a joint where one does, whose links follow, else a link."""
     positions = [item for item in items if item.signal.field == "position"]
     worst = max(positions or items, key=size)
     what = "link" if worst.signal.topic == "/tf" else "joint"
-    others = len({item.signal.item for item in items}) - 1
-    return worst, f"{what} {_any(worst)}{f' ({others} more move differently)' if others else ''}"
+    others = len({item.signal.name for item in items if item.signal.topic == worst.signal.topic}) - 1
+    more = f" ({count(others, f'more {what}')} differently too)" if others else ""
+    return worst, f"{what} {_any(worst)}{more}"
 
 
 def _first_of(items: Sequence[SignalDifference], fields: Sequence[str]) -> SignalDifference:

@@ -28,6 +28,8 @@ from replay.sensing.kinds import KINDS
 
 _SHARES = 8
 """Objects whose shares are told, the largest first."""
+_EXAMPLES = 3
+"""Sensors, and pairs, that are named where another one was asked for."""
 _COLLISION: Final = "/collision"
 
 
@@ -55,8 +57,8 @@ def explain(path: Path, signal: str, at: float, *, slow: bool = False) -> list[s
 
     Args:
         path: of the recording, whole or slim.
-        signal: topic of a sensor ("/distance/tip"), a pair ("/collision/arm/rod|table/top"), or the full name of one of
-            their signals, as `replay diff` tells it.
+        signal: topic of a sensor ("/distance/tip"), a pair ("/collision/arm/rod|table/top"), the full name of one of
+            their signals, as `replay diff` tells it, or the name of a sensor or a pair alone, where it is of one.
         at: moment [s]; the frame at or before it is looked at.
         slow: ask methods that take seconds a frame too.
 
@@ -91,17 +93,25 @@ def _check(path: Path, recorded: Layout, built: Layout) -> None:
 
 
 def _asked(recording: Recording, signal: str) -> tuple[str, str]:
-    """Return the kind and the name of the sensor that a signal is of; "" and the name of a pair."""
+    """Return the kind and the name of the sensor that a signal is of; "" and the name of a pair.
+
+    A sensor or a pair may be named alone, without its topic, where one thing is called so.
+    """
     layout = recording.layout
+    pairs = {f"{_COLLISION}/{pair}": ("", pair) for pair in layout.pairs}
+    known = {**layout.topics(), **pairs}
+    topics = [topic for topic in layout.topics() if signal == topic or signal.startswith(f"{topic}/")]
+    if topics:
+        return known[max(topics, key=len)]
     if signal.startswith(f"{_COLLISION}/"):
         found = [pair for pair in layout.pairs if signal.endswith(f"/{pair}")]
         if found:
             return "", max(found, key=len)
-    topics = [topic for topic in layout.topics() if signal == topic or signal.startswith(f"{topic}/")]
-    if topics:
-        return layout.topics()[max(topics, key=len)]
-    example = next(iter([*layout.topics(), *(f"{_COLLISION}/{pair}" for pair in layout.pairs)]), "")
-    rule = f"is no sensor or pair of the recording{f'; there is, for example, {example!r}' if example else ''}"
+    alone = [item for topic, item in known.items() if signal in (topic.removeprefix("/"), item[1])]
+    if len(alone) == 1:
+        return alone[0]
+    examples = ", ".join(map(repr, [*list(layout.topics())[:_EXAMPLES], *list(pairs)[:_EXAMPLES]]))
+    rule = f"is no sensor or pair of the recording{f'; there is, for example, {examples}' if examples else ''}"
     raise InvalidValue("SIGNAL", repr(signal), rule)
 
 

@@ -30,6 +30,7 @@ from replay.scenario.source import (
     ScenarioProvenance,
     SourceRule,
     find,
+    packed,
     problem_at,
     resolve_name,
 )
@@ -190,7 +191,7 @@ class _File:
         if named:  # else names would be missed that are written, but not to be read
             found = itertools.islice(check(Names(root, scenario)), limits.PROBLEMS)
             problems.extend(problem_at(root, path, rule) for path, rule in found)
-        provenance = ScenarioProvenance(main=self._library.main, sources=dict(self._text.sources), root=root)
+        provenance = ScenarioProvenance(main=self._library.main, sources=dict(self._text.sources), tree=packed(root))
         problems.extend(_read_meshes(self._library, self._text, root, provenance))
         if scenario is None:
             raise ScenarioError(_in_order(problems))

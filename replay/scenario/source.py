@@ -8,8 +8,10 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import pickle
 import posixpath
 import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -60,7 +62,7 @@ class ScenarioProvenance:
         originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name;
             and its `use`, of one that no reading depends on.
         log_notes: what a reader should know of the log although it is read.
-        root: the text's tree, includes merged.
+        tree: the text's tree, includes merged, as `packed` gives it: a night holds thousands, and few are looked at.
     """
 
     main: str = ""
@@ -71,7 +73,15 @@ class ScenarioProvenance:
     measured: str = ""
     originals: dict[str, dict[str, str]] = field(default_factory=dict)
     log_notes: list[Problem] = field(default_factory=list, compare=False)
-    root: Node | None = field(default=None, compare=False)
+    tree: bytes = field(default=b"", compare=False)
+
+    @cached_property
+    def root(self) -> Node | None:
+        """The text's tree, includes merged; None for a scenario that was not read from text."""
+        if not self.tree:
+            return None
+        root: Node = pickle.loads(zlib.decompress(self.tree))
+        return root
 
     @cached_property
     def sha256(self) -> dict[str, str]:
@@ -87,6 +97,11 @@ class ScenarioProvenance:
         if self.root is None:
             return Problem(f"{dotted(path)} {rule}")
         return problem_at(self.root, path, rule)
+
+
+def packed(root: Node) -> bytes:
+    """Return a tree as bytes, a tenth of what it takes as objects."""
+    return zlib.compress(pickle.dumps(root), 1)
 
 
 def locate(root: Node, path: KeyPath) -> Place:

@@ -66,6 +66,13 @@ def test_a_pair_is_told_with_its_closest_triangles_and_all_versions(recorded, ca
     assert f"surfaces there are {exact} apart" in text
 
 
+def test_a_sensor_or_a_pair_may_be_named_alone(recorded, capsys):
+    pair = replay.read(recorded).layout.pairs[0]
+    for names in (("/distance/eye", "distance/eye", "eye"), (f"/collision/{pair}", f"collision/{pair}", pair)):
+        first, *others = (explained(recorded, capsys, name, 1).splitlines()[1:] for name in names)
+        assert others == [first, first]
+
+
 def test_what_is_not_there_is_told(recorded, capsys):
     for signal, at, message in [
         ("/distance/nothing", "0", "is no sensor or pair of the recording; there is, for example"),
