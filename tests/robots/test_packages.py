@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy
 import pytest
 
 from replay.errors import RobotError
 from replay.robots.importing import Options, run
+from replay.robots.meshes import _in_python_package
 from replay.robots.packages import Packages
 from replay.robots.xml_text import XmlElement
 from tests.robots import made
@@ -54,6 +56,16 @@ def test_packages_are_found_by_their_manifest_and_where_ros_says(tmp_path):
     assert (
         found(tmp_path / "y" / "urdf", written, {"robot": tmp_path / "x" / "folder"}).path == path
     )  # given ones first
+
+
+def test_files_of_python_packages_are_called_by_their_package():
+    """Not one of a folder beside the packages that is none, nor one outside."""
+    site = Path(numpy.__file__).parents[1]
+    assert _in_python_package(site / "numpy" / "testing" / "a.stl") == "package://numpy/testing/a.stl"
+    assert _in_python_package(site / "cmeel.prefix" / "a.stl") is None
+    assert _in_python_package(site / "no_such_package" / "a.stl") is None
+    assert _in_python_package(site / "a.stl") is None
+    assert _in_python_package(site.parent / "numpy" / "a.stl") is None
 
 
 def test_a_tree_that_lost_the_name_of_its_package_is_told(tmp_path):

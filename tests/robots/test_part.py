@@ -147,6 +147,39 @@ def test_pairs_in_one_rigid_part_and_of_the_srdf_are_disabled(tmp_path):
     assert "state out: joint cd at 9 is beyond its limits 0.5 and 3: left out" in told(done)
 
 
+def test_the_only_two_bodies_of_a_robot_may_be_a_disabled_pair(tmp_path):
+    done = imported(
+        tmp_path,
+        *(made.link(name, BOX) for name in ("a", "b")),
+        made.joint("ab", "a", "b", "revolute", TURN),
+        srdf='<disable_collisions link1="b" link2="a" reason="Never"/>',
+    )
+    assert done.part.disabled == [("a", "b", "Never")]
+    assert "without bodies" not in told(done)
+
+
+def test_a_joint_that_follows_one_without_a_position_is_held_where_that_puts_it(tmp_path):
+    """A fixed joint has no position, so what mimics it is at its offset: 0.7 rad, between its limits, or at 0."""
+    done = imported(
+        tmp_path,
+        *(made.link(name, BOX) for name in ("a", "b", "c", "d", "e")),
+        made.joint("stiff", "a", "b"),
+        made.joint("turned", "a", "c", "revolute", f'{TURN}<mimic joint="stiff" multiplier="2" offset="0.7"/>'),
+        made.joint("spun", "a", "d", "continuous", '<mimic joint="stiff"/>'),
+        made.joint("glued", "a", "e", "fixed", '<mimic joint="turned"/>'),
+    )
+    links = loaded(tmp_path).links
+    for name, held in (("c", 0.7), ("d", 0.0)):
+        joint = links[name].joint
+        assert (joint.type, joint.lower, joint.upper, joint.mimic) == ("revolute", held, held, None)
+    for line in (
+        "joint turned: mimics stiff, which has no position: it is held at 0.7",
+        "joint spun: mimics stiff, which has no position: it is held at 0",
+        "joint glued: is fixed: <mimic> is dropped",
+    ):
+        assert line in told(done)
+
+
 def test_limits_of_moveit_replace_those_of_the_description(tmp_path):
     (tmp_path / "limits.yaml").write_text(
         "joint_limits:\n"
