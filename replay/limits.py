@@ -67,7 +67,7 @@ ROBOT_XML: Final = 32 * MIB
 ROBOT_ELEMENTS: Final = 200_000
 """Elements of a description; a humanoid with hands has 5 000."""
 ROBOT_DEPTH: Final = 100
-"""Elements within elements of a description or a COLLADA file."""
+"""Elements within elements of a description or a COLLADA file, and joints of which each follows the next."""
 ROBOT_FOLDERS: Final = 20_000
 """Folders that are looked into for the packages of a description."""
 ROBOT_PAIRS: Final = 20_000

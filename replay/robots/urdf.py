@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from replay import limits
 from replay.robots.description import (
     Following,
     Geometry,
@@ -178,7 +179,7 @@ def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
     if written is not None and kind in ("revolute", "continuous", "prismatic"):
         axis = triple(numbers(written, "xyz", 3, axis))
         if math.hypot(*axis) < 1e-100:
-            raise written.wrong(f"joint {name!r} has the axis 0 0 0, which has no direction")
+            raise written.wrong(f"joint {name!r} has the axis {written.text('xyz')[:60]}, which has no direction")
     for tag, rule in (
         ("dynamics", "friction and damping: <dynamics> is not used"),
         ("safety_controller", "soft limits: <safety_controller> is not used"),
@@ -284,5 +285,9 @@ def _check_mimics(joints: Mapping[str, RobotJoint]) -> None:
                 raise joint.element.wrong(rule)
             if follows.joint in chain:
                 raise joint.element.wrong(f"joint {joint.name!r} mimics itself by way of {sorted(chain)[:5]}")
+            if len(chain) > limits.ROBOT_DEPTH:
+                raise joint.element.wrong(
+                    f"joint {joint.name!r} mimics by way of more than {limits.ROBOT_DEPTH} others"
+                )
             chain.add(follows.joint)
             follows = joints[follows.joint].mimic

@@ -1,55 +1,89 @@
-"""Self-collision of an imported robot in random poses: every pair as python-fcl decides it on the same triangles."""
+"""Self-collision of imported robots in random poses: as python-fcl and coal decide, and closed forms."""
 
 from pathlib import Path
 
+import coal
 import fcl
 import numpy as np
 import pytest
 
 import replay
+from replay.errors import ReplayError
 from replay.robots import checking
 from replay.scenario.scene import build
 from replay.simulation import touching
 from tests.robots import made
-from tests.robots.test_poses import imported
+from tests.robots.test_poses import descriptions, imported
 
 PANDA = Path(replay.__file__).parents[1] / "scenarios" / "parts" / "panda.yaml"
 NEAR = 1e-6
-"""Pairs this close [m] to touching by fcl are not compared: it decides with its own rounding."""
+"""Pairs this close [m] to touching are not compared: other engines decide with their own rounding."""
 
 
-def fcl_mesh(triangles):
-    mesh = fcl.BVHModel()
-    mesh.beginModel(len(triangles), 3 * len(triangles))
-    mesh.addSubModel(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
-    mesh.endModel()
-    return mesh
+class Fcl:
+    """python-fcl on triangles."""
+
+    def shape(self, triangles):
+        mesh = fcl.BVHModel()
+        mesh.beginModel(len(triangles), 3 * len(triangles))
+        mesh.addSubModel(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
+        mesh.endModel()
+        return mesh
+
+    def placed(self, shape, pose):
+        return fcl.CollisionObject(shape, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+
+    def meet(self, a, b):
+        return fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+
+    def gap(self, a, b):
+        return fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult())
 
 
-def compared(scene, samples):
-    """Return how many pairs were in contact, and how many were compared, over random poses."""
+class Coal:
+    """coal on triangles."""
+
+    def shape(self, triangles):
+        mesh = coal.BVHModelOBBRSS()
+        mesh.beginModel(len(triangles), 3 * len(triangles))
+        for corners in triangles:
+            mesh.addTriangle(*corners)
+        mesh.endModel()
+        return mesh
+
+    def placed(self, shape, pose):
+        return coal.CollisionObject(shape, coal.Transform3s(pose[:3, :3].copy(), pose[:3, 3].copy()))
+
+    def meet(self, a, b):
+        return coal.collide(a, b, coal.CollisionRequest(), coal.CollisionResult()) > 0
+
+    def gap(self, a, b):
+        return coal.distance(a, b, coal.DistanceRequest(), coal.DistanceResult())
+
+
+ENGINES = [Fcl(), Coal()]
+
+
+def compared(scene, samples, engine):
+    """Return how many pairs were in contact, how many were decided alike, and how many there were, in random poses."""
     machine = scene.linkage
     positions = checking.random_positions(machine, samples)
     free = np.broadcast_to(np.eye(4), (samples, len(machine.free_names), 4, 4))
     met = np.concatenate(list(touching(scene, positions, free)))
     poses = machine.forward(positions, free).world
-    bodies = {body.name: (body.link, fcl_mesh(body.solid.triangles), body.solid) for body in scene.bodies}
+    bodies = {body.name: (body.link, engine.shape(body.solid.triangles), body.solid) for body in scene.bodies}
     count = 0
     for sample in range(samples):
+        placed = {name: engine.placed(shape, poses[sample, link]) for name, (link, shape, _) in bodies.items()}
         for column, name in enumerate(scene.layout.pairs):
-            (a, mesh_a, solid_a), (b, mesh_b, solid_b) = (bodies[side] for side in name.split("|"))
-            placed = [
-                fcl.CollisionObject(mesh, fcl.Transform(poses[sample, link, :3, :3], poses[sample, link, :3, 3]))
-                for link, mesh in ((a, mesh_a), (b, mesh_b))
-            ]
-            expected = fcl.collide(*placed, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+            first, second = name.split("|")
+            expected = engine.meet(placed[first], placed[second])
             if expected == met[sample, column]:
                 count += 1
-                continue
-            if expected:  # fcl takes what is nearly touching for touching: never by more than this
-                gap = fcl.distance(*placed, fcl.DistanceRequest(), fcl.DistanceResult())
-                assert gap < NEAR, f"{name} in pose {sample}"
-            else:  # surfaces that do not cross: one body is inside the other, which fcl's triangles cannot tell
+            elif expected:  # engines take what is nearly touching for touching: never by more than this
+                assert engine.gap(placed[first], placed[second]) < NEAR, f"{name} in pose {sample}"
+            else:  # surfaces that do not cross: one body is inside the other, which their triangles cannot tell
+                (a, _, solid_a), (b, _, solid_b) = bodies[first], bodies[second]
                 assert inside(solid_a, poses[sample, a], solid_b, poses[sample, b]), f"{name} in pose {sample}"
     return int(met.sum()), count, met.size
 
@@ -66,18 +100,112 @@ def inside(first, pose_first, second, pose_second):
     return False
 
 
+@pytest.mark.parametrize("engine", ENGINES, ids=["fcl", "coal"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_made_robots_touch_themselves_where_fcl_says_so(seed, tmp_path):
+def test_made_robots_touch_themselves_where_others_say_so(seed, engine, tmp_path):
     path = tmp_path / "r.urdf"
     path.write_text(made.urdf(seed, links=8, far=0.2))
-    done, _ = imported(path, tmp_path)
-    scene = build(checking.valid(done.file.read_text(), done.file, {}, deep=True))
-    touched, same, total = compared(scene, 25)
+    touched, same, total = compared(scene_of(path, tmp_path), 25, engine)
     assert same >= 0.97 * total and 0.02 * total < touched < 0.9 * total
 
 
-def test_the_shipped_arm_touches_itself_where_fcl_says_so():
+@pytest.mark.parametrize("engine", ENGINES, ids=["fcl", "coal"])
+def test_the_shipped_arm_touches_itself_where_others_say_so(engine):
     meshes = {f"panda/{path.name}": path for path in sorted((PANDA.parent / "panda").glob("*.stl"))}
     scene = build(checking.valid(PANDA.read_text(), PANDA, meshes, deep=True))
-    touched, same, total = compared(scene, 100)
+    touched, same, total = compared(scene, 100, engine)
     assert same >= 0.99 * total and touched > 5
+
+
+def scene_of(description, folder):
+    """Return the scene of a description that was imported with its meshes beside the part."""
+    done, _ = imported(description, folder, copy_meshes=True, collision="visual")
+    meshes = {path.relative_to(folder).as_posix(): path for path in (folder / "part").rglob("*") if path.is_file()}
+    return build(checking.valid(done.file.read_text(), done.file, meshes, deep=True))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("engine", ENGINES, ids=["fcl", "coal"])
+@pytest.mark.parametrize("description", descriptions(), ids=lambda path: path.name)
+def test_public_robots_touch_themselves_where_others_say_so(description, engine, tmp_path):
+    """Of robots of at most 40 bodies; one that is refused is compared in `test_poses.py`."""
+    try:
+        scene = scene_of(description, tmp_path)
+    except ReplayError:
+        return
+    if len(scene.bodies) <= 40:
+        _, same, total = compared(scene, 100, engine)
+        assert same >= 0.95 * total
+
+
+def test_capsules_meet_where_their_axes_are_within_their_radii(tmp_path):
+    """Against the distance of the segments, to the chord error of both."""
+    joints = [(kind, axis) for kind in ("prismatic", "revolute") for axis in ("1 0 0", "0 1 0", "0 0 1")]
+    limit = '<limit lower="-0.4" upper="0.4" velocity="1"/>'
+    parts = [made.link("l0", '<capsule radius="0.1" length="0.5"/>')]
+    for k, (kind, axis) in enumerate(joints):
+        body = ['<capsule radius="0.07" length="0.3"/>'] if k == len(joints) - 1 else []
+        inside = f'<axis xyz="{axis}"/>{limit}'
+        parts += [made.link(f"l{k + 1}", *body), made.joint(f"j{k}", f"l{k}", f"l{k + 1}", kind, inside)]
+    (tmp_path / "r.urdf").write_text(made.robot(*parts))
+    positions, poses, met = states(scene_of(tmp_path / "r.urdf", tmp_path), 400)
+    ends = np.array([[0, 0, 0.5], [0, 0, -0.5]])
+    gaps = []
+    for sample in range(len(positions)):
+        first, last = poses[sample]["l0"], poses[sample]["l6"]
+        a, b = (0.5 * ends) @ first[:3, :3].T + first[:3, 3], (0.3 * ends) @ last[:3, :3].T + last[:3, 3]
+        gaps.append(between_segments(a, b) - 0.17)
+    decided_as(np.array(gaps), met, 2e-3)
+
+
+def test_ellipsoids_meet_where_a_stretched_space_says_so(tmp_path):
+    """Two alike and parallel ones are balls where space is shrunk by their radii; beside a wall their height counts."""
+    slides = "".join(
+        f'<joint name="s{a}" type="slide" axis="{a}" range="-0.5 0.5"/>' for a in ("1 0 0", "0 1 0", "0 0 1")
+    )
+    turns = "".join(f'<joint name="t{a}" axis="{a}" range="-2 2"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
+    egg = '<geom type="ellipsoid" size="0.1 0.2 0.35"/>'
+    up = '<joint name="up" type="slide" axis="0 0 1" range="0 0.6"/>'
+    for inside in ("", turns):
+        still = f'<body name="a">{egg}</body>' if not inside else '<geom type="box" size="9 9 1" pos="0 0 -1"/>'
+        moved = f'<body name="b">{up if inside else slides}{inside}{egg}</body>'
+        (tmp_path / "r.xml").write_text(f"<mujoco><worldbody>{still}{moved}</worldbody></mujoco>")
+        _, poses, met = states(scene_of(tmp_path / "r.xml", tmp_path), 400)
+        radii = np.array([0.1, 0.2, 0.35])
+        T = np.array([pose["b"] for pose in poses])
+        if inside:
+            decided_as(T[:, 2, 3] - np.linalg.norm(T[:, 2, :3] * radii, axis=1), met, 1e-3)
+        else:
+            scaled = np.linalg.norm(T[:, :3, 3] / radii, axis=1)
+            decided_as(0.1 * (scaled - 2.0), met, 2e-3)  # each is 0.1 or more across: a gap is at least that share
+
+
+def states(scene, samples):
+    """Return random positions, the poses of links by name, and whether the scene's one pair meets."""
+    machine = scene.linkage
+    positions = checking.random_positions(machine, samples)
+    free = np.zeros((samples, 0, 4, 4))
+    assert len(scene.layout.pairs) == 1
+    world = machine.forward(positions, free).world
+    met = np.concatenate(list(touching(scene, positions, free)))[:, 0]
+    return positions, [dict(zip(machine.link_names, poses, strict=True)) for poses in world], met
+
+
+def decided_as(gaps, met, near):
+    """Assert that pairs meet where the gap [m] is below 0, but for gaps as small as the triangles may be off."""
+    clear = np.abs(gaps) > near
+    np.testing.assert_array_equal(met[clear], gaps[clear] < 0.0)
+    assert clear.mean() > 0.95 and 0.1 < met.mean() < 0.9
+
+
+def between_segments(a, b):
+    """Return the distance of two segments: the least over both, or from an end to the other one."""
+    u, v = a[1] - a[0], b[1] - b[0]
+    found = []
+    for point, (start, along) in [(p, (b[0], v)) for p in a] + [(p, (a[0], u)) for p in b]:
+        share = np.clip((point - start) @ along / (along @ along), 0.0, 1.0)
+        found.append(np.linalg.norm(point - start - share * along))
+    s, t = np.linalg.lstsq(np.stack([u, -v], axis=1), b[0] - a[0], rcond=None)[0]
+    if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+        found.append(np.linalg.norm(a[0] + s * u - b[0] - t * v))
+    return min(found)

@@ -89,6 +89,29 @@ WRONG = {
         made.robot(A, B, made.joint("j", "a", "b", "revolute", f'{TURN}<mimic joint="j"/>')),
         "joint 'j' mimics itself",
     ),
+    "a chain of joints that follow": (
+        made.robot(
+            *(made.link(f"l{k}") for k in range(5000)),
+            made.joint("j1", "l0", "l1", "revolute", TURN),
+            *(
+                made.joint(f"j{k}", "l0", f"l{k}", "revolute", f'{TURN}<mimic joint="j{k - 1}"/>')
+                for k in range(2, 5000)
+            ),
+        ),
+        "mimics by way of more than 100 others",
+    ),
+    "a direction that is none": (
+        made.robot(A, B, made.joint("j", "a", "b", "revolute", f'<axis xyz="1e-200 0 0"/>{TURN}')),
+        "has the axis 1e-200 0 0, which has no direction",
+    ),
+    "another encoding": (
+        "<?xml version='1.0' encoding='rot13'?><robot/>",
+        "is not XML: 'rot13' is not a text encoding",
+    ),
+    "a number of ten million digits": (
+        made.robot(made.link("a", f'<sphere radius="{"1" * 10**7}"/>')),
+        "which is no number between -1e12 and 1e12",
+    ),
     "a path out of the tree": (made.robot(made.link("a", FAR.format("../" * 9 + "etc/passwd.stl"))), "leads out of"),
     "a path out of a package": (
         made.robot(made.link("a", FAR.format("package://r/../../x.stl"))),
