@@ -19,7 +19,8 @@ def signal(page: Path, name: str, picture: Path) -> None:
         opened = browser.new_page(viewport={"width": 1000, "height": 800})
         opened.goto(page.absolute().as_uri())
         box = opened.locator("details.signal").filter(has=opened.get_by_text(name, exact=True))
-        box.locator("summary").click()
+        if not box.evaluate("details => details.open"):
+            box.locator("summary").click()
         box.screenshot(path=picture)
         browser.close()
 

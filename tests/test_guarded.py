@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import replay
 from replay import guarded, simulation
@@ -336,3 +337,40 @@ def test_the_protective_separation_follows_the_speed() -> None:
     for when, place in (("distance: tip", 0.93), ("pair: [cart, wall]", 0.94)):
         near, far = first(when, place)
         assert near < wanted <= far
+
+
+STILL = """version: 1
+name: still
+rate: 60 Hz
+duration: 0.1 s
+links:
+  wall: {{pose: {{xyz: [1, 0, 0]}}, shapes: {{slab: {{type: cuboid, size: [2 cm, 1, 1]}}}}}}
+  cart:
+    joint: {{type: prismatic, axis: [1, 0, 0], velocity: 0.3, acceleration: 1}}
+sensors:
+  distance:
+    tip:
+      link: cart
+      pose: {{xyz: [6 cm, 0, 0], rpy: [0, 90 deg, 0]}}
+      aperture: 20 deg
+      range: 2
+      signal: {{noise: {{std: 2 mm, seed: 0}}}}
+guards:
+  stop: {{when: {{distance: tip, below: {below}}}, stop: [cart]}}
+sweep: {{grid: {{sensors.distance.tip.signal.noise.seed: {{from: 1, count: {count}}}}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("deviations", "count"), [(1.5, 200), pytest.param(3.0, 10_000, marks=pytest.mark.soak)], ids=["200", "10000"]
+)
+def test_sweeps_over_seeds_stop_without_need_as_often_as_chance_says(
+    tmp_path: Path, deviations: float, count: int
+) -> None:
+    path = tmp_path / "still.yaml"
+    path.write_text(STILL.format(below=0.93 - deviations * 2e-3, count=count))
+    frames = 7
+    stopped = sum(any(block.guards.state.any() for block in replay.simulate(made)) for made in load_cases(path))
+    chance = 1.0 - (1.0 - stats.norm.cdf(-deviations)) ** frames
+    low, high = stats.binom.ppf([1e-4, 1.0 - 1e-4], count, chance)
+    assert low <= stopped <= high

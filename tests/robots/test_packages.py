@@ -74,6 +74,30 @@ def test_a_tree_that_lost_the_name_of_its_package_is_told(tmp_path):
     assert here.path == path and here.assumed == f"package robot is taken to be {tmp_path / 'moved'}"
 
 
+@pytest.mark.parametrize(
+    ("written", "mesh", "taken"),
+    [
+        (
+            "package://lab/models/robot/meshes/a.stl",
+            "robot/meshes/a.stl",
+            "package lab/models/robot is taken to be {}/robot",
+        ),
+        ("package://collision/a.stl", "robot/meshes/x/collision/a.stl", "{}/robot/meshes/x/collision"),
+    ],
+)
+def test_a_tree_that_was_moved_in_part_is_told(written, mesh, taken, tmp_path):
+    path = put(tmp_path / mesh)
+    here = found(tmp_path / "robot" / "urdf", written)
+    assert here.path == path and here.assumed.endswith(taken.format(tmp_path))
+
+
+def test_a_folder_that_is_there_twice_is_no_package(tmp_path):
+    for kind in "xy":
+        put(tmp_path / "robot" / "meshes" / kind / "collision" / "a.stl")
+    with pytest.raises(RobotError, match=r"is in each of .*; say in which with --package collision=DIR"):
+        found(tmp_path / "robot" / "urdf", "package://collision/a.stl")
+
+
 def test_what_is_not_found_says_where_it_was_looked_for(tmp_path):
     (tmp_path / "robot").mkdir()
     with pytest.raises(RobotError) as caught:

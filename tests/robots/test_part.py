@@ -216,8 +216,36 @@ def test_limits_that_leave_a_leader_no_position_are_dropped_with_a_loss(tmp_path
         made.joint("j", "a", "b", "revolute", TURN),
         made.joint("k", "a", "c", "revolute", follower),
     )
-    assert done.lossy and "they leave no position to j, which it follows" in told(done)
+    assert done.lossy and "they leave nowhere to go to j, which it follows" in told(done)
     assert loaded(tmp_path).links["c"].joint.lower == -np.inf
+
+
+def test_limits_that_leave_a_leader_one_position_are_dropped_with_a_loss(tmp_path):
+    """A gripper as some describe it: its tips turn against it, with the limits of the fingers."""
+    follower = '<limit lower="0" upper="1" velocity="1" effort="1"/><mimic joint="j" multiplier="-1"/>'
+    done = imported(
+        tmp_path,
+        *(made.link(name) for name in "abc"),
+        made.joint("j", "a", "b", "revolute", '<limit lower="0" upper="1" velocity="1" effort="1"/>'),
+        made.joint("k", "b", "c", "revolute", follower),
+    )
+    assert done.lossy and "its limits 0 and 1 are dropped: they leave nowhere to go to j" in told(done)
+    links = loaded(tmp_path).links
+    assert (links["c"].joint.lower, links["b"].joint.lower, links["b"].joint.upper) == (-np.inf, 0.0, 1.0)
+
+
+def test_a_rate_below_zero_limits_nothing(tmp_path):
+    turn = '<limit lower="0" upper="1" velocity="-1" effort="-1"/>'
+    done = imported(tmp_path, made.link("a"), made.link("b"), made.joint("j", "a", "b", "revolute", turn))
+    assert "joint j: a limit of velocity of -1, by which nothing moves, is left out" in told(done)
+
+
+def test_macros_that_were_not_expanded_are_told_and_what_they_may_stand_for_is_a_loss(tmp_path):
+    shown = f"<visual><geometry>{BOX}</geometry><xacro:grey/></visual>"
+    done = imported(tmp_path, f'<link name="a">{shown}<collision><geometry>{BOX}</geometry></collision></link>')
+    assert not done.lossy and "link a: <xacro:grey> of a <visual> is not used" in told(done)
+    done = imported(tmp_path, made.link("a", BOX), "<xacro:sensors/>")
+    assert done.lossy and "1 x <xacro:sensors>: is a macro of xacro that was not expanded" in told(done)
 
 
 def test_a_part_that_was_changed_by_hand_is_not_replaced(tmp_path):
