@@ -59,6 +59,18 @@ def test_accepting_shows_refuses_and_logs(tmp_path, capsys):
     assert run(["accept", str(tmp_path), "--baseline", str(base)]) is ExitCode.INVALID
 
 
+@pytest.mark.parametrize("written", [None, "", "{", "[]", "{}", '{"scenarios": {"a": {"status": "of no kind"}}}'])
+def test_what_is_no_run_folder_is_not_accepted(tmp_path, capsys, written):
+    (tmp_path / "out").mkdir()
+    if written is not None:
+        (tmp_path / "out" / "run.json").write_text(written)
+    accept = ["accept", str(tmp_path / "out"), "--baseline", str(tmp_path / "base"), "--yes", "--reason", "x"]
+    assert run(accept) is ExitCode.INVALID
+    said = capsys.readouterr().err
+    assert "is no run folder: it has no run.json of replay" in said and said.count("\n") == 1
+    assert not (tmp_path / "base").exists()
+
+
 @pytest.mark.parametrize("changed", ["model", "text", "nothing"])
 def test_a_run_of_another_model_or_text_is_accepted_anew_although_it_reads_the_same(tmp_path, capsys, changed):
     path = scenes.write(tmp_path / "in", "a")

@@ -13,10 +13,12 @@ import pytest
 from rerun.chunk import RrdReader
 
 import replay
+from replay import simulation
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.collision.columns import Between
 from replay.comparison.difference import DiffVerdict
+from replay.recording.record import record
 
 TUNNEL = """
 version: 1
@@ -120,9 +122,17 @@ def test_info_and_export_tell_it(recorded: Path, tmp_path: Path, capsys: pytest.
     assert pair[f"{name} clearance bound [m]"][5] == 0.0
 
 
-def test_rerun_colours_the_bodies_while_they_meet(recorded: Path) -> None:
+@pytest.mark.parametrize("block", [None, 4, 3, 1])
+def test_rerun_colours_the_bodies_while_they_meet(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int | None
+) -> None:
+    """Whatever the blocks of frames: frame 5 is in the first one, or in a later one."""
+    file = recorded / "tunnel.rrd"
+    if block is not None:
+        monkeypatch.setattr(simulation, "BLOCK_FRAMES", block)
+        file = record(replay.load(written(tmp_path)), tmp_path / "out").rrd
     found = {}
-    for chunk in RrdReader(str(recorded / "tunnel.rrd")).stream():
+    for chunk in RrdReader(str(file)).stream():
         batch = chunk.to_record_batch()
         names = batch.schema.names
         albedo = [name for name in names if name.endswith("albedo_factor")]

@@ -48,6 +48,7 @@ MOST_MEMORY = 3 << 30
 """Bytes of a trial and its children; beyond, it is ended."""
 _OPTIONS = ("-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
 _OPTIONS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is preloaded
+_AUTOGROUP = Path("/proc/self/autogroup")
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _TOLD = "told.json"
 _NO_TEST = 5  # pytest's exit code when all are left out
@@ -169,7 +170,7 @@ def _be_pytest(
     """Become a process that runs tests and ends with pytest's exit code; never returns."""
     code = 70
     try:
-        os.setsid()
+        _begin_session()
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         descriptor = os.open(output, os.O_WRONLY | os.O_CREAT)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -196,6 +197,14 @@ def _be_pytest(
             sys.stdout.flush()
             sys.stderr.flush()
         os._exit(code)
+
+
+def _begin_session() -> None:
+    """Begin a session, no more urgent than the one before: Linux schedules sessions, and a new one has priority 0."""
+    before = _AUTOGROUP.read_text().split()[-1] if _AUTOGROUP.exists() else "0"
+    os.setsid()
+    with contextlib.suppress(OSError):
+        _AUTOGROUP.write_text(before)
 
 
 class _Watch:

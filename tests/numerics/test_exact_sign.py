@@ -72,7 +72,7 @@ def test_determinants_of_dependent_rows_are_zero_and_of_almost_dependent_ones_ar
         assert sign_of_determinant(b, c, a) == expected
         assert sign_of_determinant(b, a, c) == -expected
     counts = np.unique(signs, return_counts=True)[1]
-    assert (counts > 100).all()
+    assert (counts > cases(100)).all()
 
 
 def test_random_determinants_have_the_sign_of_rational_arithmetic():

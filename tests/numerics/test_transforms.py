@@ -57,3 +57,13 @@ def test_slerp_turns_evenly_on_the_shortest_arc(angle):
     turned = transforms.slerp(np.tile(start, (11, 1)), np.tile(end, (11, 1)), fraction)
     expected = Rotation.from_rotvec(np.outer(fraction * angle, [0.0, 1.0, 0.0])).as_matrix()
     np.testing.assert_allclose(transforms.from_quaternion(turned)[:, :3, :3], expected, atol=EPS)
+
+
+@pytest.mark.parametrize("excess", [0.0, 1e-9, -1e-9])
+def test_slerp_gives_unit_quaternions_although_its_ends_are_rounded(excess):
+    rng = np.random.default_rng(5)
+    ends = rng.normal(size=(2, cases(5000), 4))
+    start, end = ends / np.linalg.norm(ends, axis=-1)[..., None] * (1.0 + excess)
+    found = transforms.slerp(start, end, rng.uniform(size=len(start)))
+    lengths = np.sqrt(np.sum(found.astype(np.longdouble) ** 2, axis=1))
+    np.testing.assert_allclose(lengths.astype(float), 1.0, rtol=0, atol=4e-16)

@@ -87,4 +87,4 @@ def test_a_part_above_the_plane_is_within_its_bound():
             continue
         seen += 1
         assert abs(value - plate_integral(triangle[None], [half, half])[0]) <= bound
-    assert seen > 150
+    assert seen > cases(150)
