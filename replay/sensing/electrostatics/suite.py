@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,13 +14,28 @@ from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entries_of
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
-from replay.sensing.electrostatics import bem, cholesky, circuit, gap, influence, products, proxy
+from replay.sensing.electrostatics import (
+    bem,
+    cholesky,
+    circuit,
+    cut,
+    field,
+    gap,
+    influence,
+    potential_grid,
+    products,
+    proxy,
+)
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.circuit import output_voltages
 from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON, Station, stations
 from replay.sensing.electrostatics.contacts import Stand, stand
+from replay.sensing.electrostatics.field import Field
 from replay.sensing.electrostatics.keyframes import between_keys, pieces
 from replay.sensing.electrostatics.motion import PoseTrack, Solved
+from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.proxy import Proxy
+from replay.sensing.electrostatics.unit import Unit
 from replay.sensing.target import Target
 
 _TOLERANCE = 5e-3
@@ -32,7 +47,34 @@ FEW = 5
 
 def kernels(*, method: str, savings: bool = True, **_options: Any) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `ElectrostaticSuite`."""
-    return entries_of(containment, influence, cholesky, products, gap, circuit, proxy)
+    shared = entries_of(containment, influence, cholesky, products, gap, circuit, proxy)
+    return (*shared, *entries_of(cut, field, potential_grid)) if method == "field" else shared
+
+
+class Solver(Protocol):
+    """What solves the poses of bodies before a unit."""
+
+    def read(self, placement: PosedBodies) -> bem.BemReading | None:
+        """Return what bodies change in one pose; None where there is no answer."""
+
+    def proxy(self, placement: PosedBodies) -> Floats:
+        """Return E (k,) [m] of one pose, see `keyframes`."""
+
+
+class Reference:
+    """Solves by `bem`; arguments as of `proxy.Proxy`."""
+
+    def __init__(self, unit: Unit, surface: Floats, bodies: tuple[ConductorBody, ...]) -> None:
+        self._unit = unit
+        self._proxy = Proxy(unit, surface, bodies)
+
+    def read(self, placement: PosedBodies) -> bem.BemReading | None:
+        """See `Solver`."""
+        return bem.read(self._unit, placement)
+
+    def proxy(self, placement: PosedBodies) -> Floats:
+        """See `Solver`."""
+        return self._proxy.of(placement)
 
 
 class ElectrostaticSuite:
@@ -44,10 +86,11 @@ class ElectrostaticSuite:
     Args:
         sensors: in the order of the columns.
         targets: the sensed shapes, in the order of `per_object`.
-        method: "bem".
+        method: "field", or "bem".
         drive: "alone": output voltages with one sensor of a unit driven at a time; "together": with all of them.
+        accuracy: of "field": error, as a share of a reading, from which on more unknowns are taken.
         savings: False solves every frame anew; else readings of frames between those that are solved are splines, and
-            `error` holds what that costs, at most about 0.5 % (`keyframes`).
+            `error` holds what that costs, at most about 0.5 %, of "field" a third of `accuracy` (`keyframes`).
         watched: names of sensors whose units are solved in every frame: what they read must not depend on later ones.
 
     Attributes:
@@ -64,8 +107,9 @@ class ElectrostaticSuite:
         sensors: Sequence[Any],
         targets: Sequence[Target],
         *,
-        method: str = "bem",
+        method: str = "field",
         drive: str = "alone",
+        accuracy: float = 0.03,
         savings: bool = True,
         watched: frozenset[str] = frozenset(),
     ) -> None:
@@ -74,7 +118,9 @@ class ElectrostaticSuite:
         self.method = method
         self.stations = stations(self.sensors, self.targets)
         self.solved = 0
-        self._proxy: dict[int, Proxy] = {}
+        self._accuracy = accuracy
+        self._tolerance = accuracy / 3.0 if method == "field" else _TOLERANCE
+        self._solvers: dict[int, Solver] = {}
         self._together = drive == "together"
         self._savings = savings
         self._watched = watched
@@ -115,29 +161,36 @@ class ElectrostaticSuite:
         standing = stand(station, targets, np.ascontiguousarray(track.poses))
         readings: dict[int, bem.BemReading | None] = {}
 
+        solver = self._solver(station)
+
         def solve(pose: int) -> bem.BemReading | None:
             if pose not in readings:
-                readings[pose] = bem.read(station.unit, standing.placements[pose])
+                readings[pose] = solver.read(standing.placements[pose])
                 self.solved += 1
             return readings[pose]
 
         if splines and len(track.poses) > FEW:
             found = between_keys(
                 lambda frame: solve(int(track.pose_of[frame])),
-                self._proxies(station, standing)[track.pose_of],
+                np.stack([solver.proxy(placement) for placement in standing.placements])[track.pose_of],
                 pieces(_outlines(standing)[track.pose_of], standing.states[track.pose_of]),
-                _TOLERANCE,
+                self._tolerance,
             )
             if found is not None:
                 touching, unresolved = standing.touching[track.pose_of], standing.unresolved[track.pose_of]
                 return Solved(found.increase, found.error, found.shares, touching, unresolved)
         return Solved.of(standing, [solve(pose) for pose in range(len(track.poses))], k)[track.pose_of]
 
-    def _proxies(self, station: Station, standing: Stand) -> Floats:
-        """Return E (n, k) of each pose."""
-        if station.link not in self._proxy:
-            self._proxy[station.link] = Proxy(station.unit, station.surface, station.bodies)
-        return np.stack([self._proxy[station.link].of(placement) for placement in standing.placements])
+    def _solver(self, station: Station) -> Solver:
+        """Return what solves the poses of a unit."""
+        if station.link not in self._solvers:
+            made = (station.unit, station.surface, station.bodies)
+            self._solvers[station.link] = (
+                Field(*made, behind=station.has_back, accuracy=self._accuracy)
+                if self.method == "field"
+                else Reference(*made)
+            )
+        return self._solvers[station.link]
 
     def _fill(self, columns: CapacitiveColumns, station: Station, solved: Solved) -> None:
         """Write the readings of one unit."""

@@ -139,7 +139,12 @@ class Unit:
     def potential(self, panels: Panels) -> tuple[Floats, Floats]:
         """Return the mean potentials (k, n) on panels, each electrode alone at 1 V: extrapolated, and the fine one."""
         first, second = (mean_potentials(panels, mesh.panels, mesh.charges) for mesh in self.charged)
-        return second + (second - first) / _GAIN, second
+        return self.extrapolated(first, second), second
+
+    @staticmethod
+    def extrapolated(coarse: Floats, fine: Floats) -> Floats:
+        """Return what potentials of both meshes say of a mesh without end."""
+        return fine + (fine - coarse) / _GAIN
 
     def _charged(self, fineness: float) -> Charged:
         panels, electrode = self.mesh(fineness)
