@@ -65,12 +65,13 @@ class Station:
         return np.ascontiguousarray(np.concatenate([*self.plates, self.behind]))
 
 
-def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station, ...]:
+def stations(sensors: Sequence[Any], targets: Sequence[Target], *, coarser: float = 1.0) -> tuple[Station, ...]:
     """Return the sensors of a scene as units, in the order of their links.
 
     Args:
         sensors: as `sensing.capacitive.sensor.CapacitiveSensor`.
         targets: the sensed shapes.
+        coarser: of the units' meshes, see `unit.Unit`.
 
     Raises:
         InvalidValue: sensors of one link that ignore other links, or drive what is behind them differently.
@@ -111,7 +112,7 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station
                 plates=plates,
                 behind=behind,
                 driven=first.driven,
-                unit=kept_unit(electrodes),
+                unit=kept_unit(electrodes, coarser),
                 bodies=tuple(bodies),
                 links=tuple(links),
                 objects=np.array(objects, dtype=np.intp),
@@ -123,16 +124,16 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station
 _units: OrderedDict[bytes, Unit] = OrderedDict()
 
 
-def kept_unit(electrodes: Sequence[Electrode]) -> Unit:
+def kept_unit(electrodes: Sequence[Electrode], coarser: float = 1.0) -> Unit:
     """Return a unit; one that this process made of the same surfaces comes with what was computed of it."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(f"{coarser!r}".encode())
     for electrode in electrodes:
         digest.update(f"{len(electrode.surfaces)}".encode())
         for surface in electrode.surfaces:
             digest.update(f" {len(surface)} ".encode() + np.ascontiguousarray(surface).tobytes())
     key = digest.digest()
     if key not in _units:
-        _units[key] = Unit(electrodes)
+        _units[key] = Unit(electrodes, coarser=coarser)
         while len(_units) > _KEPT_UNITS:
             _units.popitem(last=False)
     _units.move_to_end(key)

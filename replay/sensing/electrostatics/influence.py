@@ -183,6 +183,18 @@ def mean_potentials(panels: Panels, sources: Panels, charges: Floats) -> Floats:
     return result
 
 
+@leaf_kernel
+def over_points(x: float, y: float, z: float, sources: Panels, j: int) -> float:
+    """Return the mean of 1/r from a point over the points that stand for panel j."""
+    n = 4 if sources.four[j] else 3
+    total = 0.0
+    for k in range(n):
+        a, b = (_FOUR_4[k, 0], _FOUR_4[k, 1]) if n == 4 else (_TRIANGLE_3[k, 0], _TRIANGLE_3[k, 1])
+        X, Y, Z = point_on(sources, j, a, b)
+        total += 1.0 / math.sqrt((x - X) * (x - X) + (y - Y) * (y - Y) + (z - Z) * (z - Z))
+    return total / n
+
+
 @entry(float64[:, ::1], PANELS_TYPE, float64[:, ::1])
 @kernel
 def point_potentials(points: Floats, sources: Panels, charges: Floats) -> Floats:
@@ -197,22 +209,8 @@ def point_potentials(points: Floats, sources: Panels, charges: Floats) -> Floats
             squared = X * X + Y * Y + Z * Z
             if squared > FAR * FAR * diameter[j] * diameter[j]:
                 value = 1.0 / math.sqrt(squared)
-            elif squared > _MIDDLE * _MIDDLE * diameter[j] * diameter[j]:
-                value = _over_points(x, y, z, sources, j)
             else:
                 value = potential_at((x, y, z), sources, j)
             for c in range(k):
                 result[c, i] += charges[c, j] * value
     return result
-
-
-@leaf_kernel
-def _over_points(x: float, y: float, z: float, sources: Panels, j: int) -> float:
-    """Return the mean of 1/r from a point over the points that stand for panel j."""
-    n = 4 if sources.four[j] else 3
-    total = 0.0
-    for k in range(n):
-        a, b = (_FOUR_4[k, 0], _FOUR_4[k, 1]) if n == 4 else (_TRIANGLE_3[k, 0], _TRIANGLE_3[k, 1])
-        X, Y, Z = point_on(sources, j, a, b)
-        total += 1.0 / math.sqrt((x - X) * (x - X) + (y - Y) * (y - Y) + (z - Z) * (z - Z))
-    return total / n

@@ -8,7 +8,7 @@ import numpy as np
 from numba import float64, int64
 
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import kernel, leaf_kernel, record
+from replay.numerics.jit import inlined_kernel, leaf_kernel, record
 from replay.sensing.electrostatics.nodes import WITHIN, Nodes, node_mean
 
 _SIZE = 1 << 20
@@ -33,7 +33,7 @@ def make_memory() -> Memory:
     return Memory(np.full(_SIZE, -1), np.zeros(_SIZE), np.zeros(1, np.int64))
 
 
-@leaf_kernel
+@inlined_kernel
 def _place(memory: Memory, key: int) -> int:
     """Return where a key is, or would be."""
     at = np.int64((np.uint64(key) * _MIX) >> _SHIFT)
@@ -53,7 +53,15 @@ def _before(nodes: Nodes, i: int, j: int) -> bool:
     return i < j
 
 
-@kernel
+@inlined_kernel
+def recalled(memory: Memory, i: int, j: int) -> float:
+    """Return the mean of 1/r over two nodes of one body; 0 if it is not known."""
+    key = (min(i, j) << 24) | max(i, j)
+    at = _place(memory, key)
+    return memory.values[at] if memory.keys[at] == key else 0.0
+
+
+@leaf_kernel
 def remembered(memory: Memory, nodes: Nodes, i: int, j: int, stack: Integers, shares: Floats) -> float:
     """Return the mean of 1/r over two nodes of one body; once the memory is full, what is new is computed each time."""
     key = (min(i, j) << 24) | max(i, j)

@@ -14,15 +14,26 @@ import numpy as np
 from numba import boolean, float64, int64
 
 from replay.numerics.arrays import Flags, Floats, Integers
-from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel, record
+from replay.numerics.jit import entry, kernel, leaf_kernel, record
 from replay.numerics.triples import Triple, along, cross, dot, minus, norm
 from replay.sensing.electrostatics.influence import pair_mean, point_on
 from replay.sensing.electrostatics.panels import PANELS_TYPE, Panels
 
 _NORMAL = 0.06
-WITHIN, ACROSS = (2.5, 10.0), (1.8, 5.0)
-"""Distances, in diameters, below which nodes are taken apart and beyond which one point of each stands for it, between
-them four: for nodes of one conductor as between panels, see `influence`; for others with an error of 0.2 %."""
+Rule = tuple[float, float, float]
+
+WITHIN, ACROSS = (1.0, 2.0, 6.0), (0.85, 1.8, 5.0)
+"""Distances, in diameters, up to which panels have the closed form, up to which they are cut in four and clusters are
+taken apart, and beyond which one point of each stands for it, between them four: for nodes of one conductor, and of
+others."""
+
+_SIDE = [0.5 * (k + 0.5 + sign / math.sqrt(12.0)) for k in (0, 1) for sign in (-1.0, 1.0)]
+_QUARTERS_FOUR = np.array([(s, t) for s in _SIDE for t in _SIDE])
+_THIRD = np.array([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)])
+_QUARTERS_TRIANGLE = np.concatenate(
+    [0.5 * _THIRD, 0.5 * _THIRD + [0.5, 0.0], 0.5 * _THIRD + [0.0, 0.5], 0.5 - 0.5 * _THIRD]
+)
+"""Points (s, t) at origin + s u + t v, of one weight."""
 
 _ROOM = 30_000
 """Halves that there is room for besides the panels of a surface."""
@@ -58,22 +69,7 @@ def make_nodes(surfaces: list[Panels]) -> Nodes:
     total = len(panels.area)
     shape_of = np.repeat(np.arange(len(surfaces)), [len(each.area) for each in surfaces])
     spots = np.concatenate([panels.centroid, _NORMAL * _normals(panels)], axis=1)
-    size = 2 * total + _ROOM
-    nodes = Nodes(
-        Panels(
-            *(np.zeros((size, 3)) for _ in range(3)),
-            np.zeros(size, np.bool_),
-            np.zeros((size, 3)),
-            np.zeros(size),
-            np.zeros(size),
-        ),
-        np.zeros(size, np.bool_),
-        np.full(size, -1),
-        np.zeros((size, 4, 3)),
-        np.full((size, 4), 0.25),
-        np.zeros(size, np.int64),
-        np.zeros(1, np.int64),
-    )
+    nodes = _empty(2 * total - len(surfaces))
     members: list[Integers] = [np.flatnonzero(shape_of == s) for s in range(len(surfaces))]
     at = 0
     while at < len(members):
@@ -87,6 +83,33 @@ def make_nodes(surfaces: list[Panels]) -> Nodes:
         _fill(nodes, k, panels, own)
     nodes.count[0] = len(members)
     return nodes
+
+
+def _empty(size: int) -> Nodes:
+    """Return nodes of which there are none yet."""
+    vectors = (np.zeros((size, 3)) for _ in range(3))
+    numbers = (np.zeros(size) for _ in range(2))
+    panels = Panels(*vectors, np.zeros(size, np.bool_), np.zeros((size, 3)), *numbers)
+    points, weights = np.zeros((size, 4, 3)), np.zeros((size, 4))
+    counts = np.zeros(size, np.int64), np.zeros(1, np.int64)
+    return Nodes(panels, np.zeros(size, np.bool_), np.full(size, -1), points, weights, *counts)
+
+
+def with_room(nodes: Nodes) -> Nodes:
+    """Return a copy that halves can be added to."""
+    n = int(nodes.count[0])
+    result = _empty(n + _ROOM)
+    for into, values in zip((*result.panels, *result[1:6]), (*nodes.panels, *nodes[1:6]), strict=True):
+        into[:n] = values[:n]
+    result.count[0] = n
+    return result
+
+
+def placed_apart(nodes: Nodes) -> Nodes:
+    """Return nodes that are the same but for their places, which are for `place` to write."""
+    origin, u, v, centroid = (np.zeros_like(nodes.panels.origin) for _ in range(4))
+    panels = nodes.panels._replace(origin=origin, u=u, v=v, centroid=centroid)
+    return nodes._replace(panels=panels, points=np.zeros_like(nodes.points))
 
 
 def _normals(panels: Panels) -> Floats:
@@ -128,7 +151,6 @@ def _fill(nodes: Nodes, k: int, panels: Panels, own: Integers) -> None:
         axis = np.linalg.eigh(spread.T @ spread)[1][:, -1]
         order = np.argsort(np.round(spread @ axis, 12), kind="stable")
         groups += [wide[order[: len(wide) // 2]], wide[order[len(wide) // 2 :]]]
-    nodes.weights[k] = 0.0
     for j, group in enumerate(groups):
         share = panels.area[group]
         nodes.points[k, j] = np.average(panels.centroid[group], axis=0, weights=share)
@@ -138,17 +160,16 @@ def _fill(nodes: Nodes, k: int, panels: Panels, own: Integers) -> None:
 
 @kernel
 def _spread(nodes: Nodes, k: int) -> None:
-    """Write the points of a panel."""
+    """Write the points of a panel: four, or of a triangle three."""
     four = nodes.panels.four[k]
-    nodes.weights[k, 3] = 0.25 if four else 0.0
     for j in range(4):
         if four:
             a = 0.21132486540518713 if j < 2 else 0.7886751345948129
             b = 0.21132486540518713 if j % 2 == 0 else 0.7886751345948129
+            nodes.weights[k, j] = 0.25
         else:
             a, b = 1.0 / 6.0 if j != 1 else 2.0 / 3.0, 1.0 / 6.0 if j != 2 else 2.0 / 3.0
-            if j < 3:
-                nodes.weights[k, j] = 1.0 / 3.0
+            nodes.weights[k, j] = 1.0 / 3.0 if j < 3 else 0.0
         x, y, z = point_on(nodes.panels, k, a, b)
         nodes.points[k, j, 0], nodes.points[k, j, 1], nodes.points[k, j, 2] = x, y, z
 
@@ -201,38 +222,89 @@ def children(nodes: Nodes, k: int) -> int:
     return first
 
 
-@inlined_kernel
-def far_mean(a: Nodes, i: int, b: Nodes, j: int, far: float) -> float:
-    """Return 1/r [1/m] between the centroids of two nodes that are farther than so many diameters; else 0."""
-    x = a.panels.centroid[i, 0] - b.panels.centroid[j, 0]
-    y = a.panels.centroid[i, 1] - b.panels.centroid[j, 1]
-    z = a.panels.centroid[i, 2] - b.panels.centroid[j, 2]
-    square, D = x * x + y * y + z * z, max(a.panels.diameter[i], b.panels.diameter[j])
-    return 1.0 / math.sqrt(square) if square > far * far * D * D else 0.0
-
-
+@entry(NODES_TYPE, int64)
 @kernel
+def first_child(nodes: Nodes, k: int) -> int:
+    """Return the first of the two children of a node, see `children`."""
+    return children(nodes, k)
+
+
+@leaf_kernel
+def _turn(vector: Floats, T: Floats, share: float, into: Floats) -> None:
+    """Write a vector that is turned, and moved by a share of the pose's way."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for axis in range(3):
+        into[axis] = T[axis, 0] * x + T[axis, 1] * y + T[axis, 2] * z + share * T[axis, 3]
+
+
+@entry(NODES_TYPE, int64[::1], float64[:, :, ::1], NODES_TYPE)
+@kernel
+def place(nodes: Nodes, which: Integers, T: Floats, into: Nodes) -> None:
+    """Write where nodes and all clusters and panels that they are made of are, with a pose (shapes, 4, 4) of each."""
+    stack = np.zeros(_ROOM, np.int64)
+    for k in range(len(which)):
+        stack[0] = which[k]
+        size = 1
+        while size > 0:
+            size -= 1
+            node = stack[size]
+            M = T[nodes.shape[node]]
+            _turn(nodes.panels.centroid[node], M, 1.0, into.panels.centroid[node])
+            for j in range(4):
+                _turn(nodes.points[node, j], M, 1.0, into.points[node, j])
+            if nodes.alone[node]:
+                _turn(nodes.panels.origin[node], M, 1.0, into.panels.origin[node])
+                _turn(nodes.panels.u[node], M, 0.0, into.panels.u[node])
+                _turn(nodes.panels.v[node], M, 0.0, into.panels.v[node])
+            else:
+                stack[size], stack[size + 1] = nodes.child[node], nodes.child[node] + 1
+                size += 2
+
+
+@leaf_kernel
 def mean_of_points(a: Nodes, i: int, b: Nodes, j: int) -> float:
     """Return the mean of 1/r over four points of each of two nodes."""
     total = 0.0
     for k in range(4):
         if a.weights[i, k] > 0.0:
-            p = (a.points[i, k, 0], a.points[i, k, 1], a.points[i, k, 2])
+            x, y, z = a.points[i, k, 0], a.points[i, k, 1], a.points[i, k, 2]
+            part = 0.0
             for m in range(4):
-                if b.weights[j, m] > 0.0:
-                    q = (b.points[j, m, 0], b.points[j, m, 1], b.points[j, m, 2])
-                    total += a.weights[i, k] * b.weights[j, m] / norm(minus(p, q))
+                X, Y, Z = x - b.points[j, m, 0], y - b.points[j, m, 1], z - b.points[j, m, 2]
+                part += b.weights[j, m] / math.sqrt(X * X + Y * Y + Z * Z)
+            total += a.weights[i, k] * part
     return total
 
 
-@kernel
-def node_mean(a: Nodes, i: int, b: Nodes, j: int, rule: tuple[float, float], stack: Integers, shares: Floats) -> float:
+@leaf_kernel
+def _mean_of_quarters(a: Nodes, i: int, b: Nodes, j: int) -> float:
+    """Return the mean of 1/r over a panel i that is cut in four, with three or four points each, and points of j."""
+    four = a.panels.four[i]
+    total = 0.0
+    for m in range(4):
+        if b.weights[j, m] > 0.0:
+            q = (b.points[j, m, 0], b.points[j, m, 1], b.points[j, m, 2])
+            part = 0.0
+            for k in range(len(_QUARTERS_FOUR) if four else len(_QUARTERS_TRIANGLE)):
+                s, t = (
+                    (_QUARTERS_FOUR[k, 0], _QUARTERS_FOUR[k, 1])
+                    if four
+                    else (_QUARTERS_TRIANGLE[k, 0], _QUARTERS_TRIANGLE[k, 1])
+                )
+                x, y, z = point_on(a.panels, i, s, t)
+                X, Y, Z = x - q[0], y - q[1], z - q[2]
+                part += 1.0 / math.sqrt(X * X + Y * Y + Z * Z)
+            total += b.weights[j, m] * part / (len(_QUARTERS_FOUR) if four else len(_QUARTERS_TRIANGLE))
+    return total
+
+
+@leaf_kernel
+def node_mean(a: Nodes, i: int, b: Nodes, j: int, rule: Rule, stack: Integers, shares: Floats) -> float:
     """Return the mean of 1/r [1/m] over node i of `a` and j of `b`, clusters that are near taken apart.
 
-    Beyond rule[1] diameters one point of each does, beyond rule[0] four. `stack` (n, 2) and `shares` (n,) are scratch
-    memory.
+    `stack` (n, 2) and `shares` (n,) are scratch memory.
     """
-    middle, far = rule
+    closed, middle, far = rule
     stack[0, 0], stack[0, 1] = i, j
     shares[0] = 1.0
     size, total = 1, 0.0
@@ -243,13 +315,18 @@ def node_mean(a: Nodes, i: int, b: Nodes, j: int, rule: tuple[float, float], sta
         D = max(a.panels.diameter[p], b.panels.diameter[q])
         square = dot(gap, gap)
         if square > far * far * D * D:
-            total += share / np.sqrt(square)
+            total += share / math.sqrt(square)
         elif square > middle * middle * D * D:
             total += share * mean_of_points(a, p, b, q)
         elif a.alone[p] and b.alone[q]:
-            total += share * pair_mean(a.panels, p, b.panels, q)
+            if square <= closed * closed * D * D:
+                total += share * pair_mean(a.panels, p, b.panels, q)
+            elif a.panels.diameter[p] >= b.panels.diameter[q]:
+                total += share * _mean_of_quarters(a, p, b, q)
+            else:
+                total += share * _mean_of_quarters(b, q, a, p)
         elif size + 2 > len(shares):
-            total += share / max(np.sqrt(square), 0.3 * D)
+            total += share / max(math.sqrt(square), 0.3 * D)
         elif not a.alone[p] and (b.alone[q] or a.panels.diameter[p] >= b.panels.diameter[q]):
             first = a.child[p]
             for c in (first, first + 1):

@@ -1,114 +1,150 @@
 """The unit's potential and the distance to it, in nested grids around it: what every frame and every pose asks for.
 
-Level l has cells of 1 cm times 2^l and reaches ten of them beyond the unit's box. Values between are those of
-Catmull and Rom's cubics (1974). Outside the largest grid, and where a caller wants more than a grid gives near the
-unit, potentials are summed over the panels.
+Level l has cells of 5 mm times 2^l and reaches ten of them beyond the unit's box. Values between are those of Catmull
+and Rom's cubics (1974). A node's values are computed when somebody first comes by; they follow from its place alone.
+Outside the largest grid, and where a caller wants more than a grid gives near the unit, potentials are summed.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+import threading
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import float64, int64
+from numba import boolean, float64, int64
 
-from replay.geometry.tree import triangle_tree
-from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import entry, kernel, leaf_kernel
+from replay.geometry.closest import distance_to_surface
+from replay.geometry.tree import TREE_TYPE, Tree, triangle_tree
+from replay.numerics.arrays import Flags, Floats, Integers
+from replay.numerics.jit import entry, kernel, leaf_kernel, record
+from replay.sensing.electrostatics.charge_tree import CHARGE_TREE_TYPE, ChargeTree, add_potentials, charge_tree
 from replay.sensing.electrostatics.influence import point_potentials
-from replay.sensing.electrostatics.proxy import surface_distances
-from replay.sensing.electrostatics.unit import Unit
 
-_CELL = 0.01
-_LEVELS = 6
+if TYPE_CHECKING:
+    from replay.sensing.electrostatics.unit import Unit
+
+_CELL, _FINEST = 5e-3, 1.0 / 150.0
+"""The finest cells [m], and as a share of a unit's longest side for one so large that they would be too many."""
+
+_LEVELS = 7
 _AROUND = 10
+_NEAR = 3.0
+"""Nearer to the unit than so many of the finest cells a grid does not follow the potential."""
 
-NEAR = 3.0 * _CELL
-"""Nearer to the unit than this [m] a grid does not follow the potential."""
+_PROBES = 8
+"""Points along each edge of the box on which the extrapolation is judged."""
+
+_filling = threading.Lock()
+"""Units are shared by all that is computed in a process."""
 
 
-@dataclass(frozen=True, eq=False)
-class Grids:
-    """Values at the nodes of all levels, one level after the other.
+class PotentialGrid(NamedTuple):
+    """Values at the nodes of all levels, one level after the other, and what they are computed from."""
 
-    Attributes:
-        values: (n, m): distance [m], potentials of k electrodes alone at 1 V, zeros to fill vectors of four.
-        origins: (levels, 3) [m]; cells: (levels,) [m].
-        shapes: (levels, 3) nodes along each axis; begins: (levels,) first row of each.
-    """
+    values: Floats  # (n m,): distance [m], potentials of k electrodes alone at 1 V, zeros to fill vectors of four
+    known: Flags  # (n,) whether they are there
+    whole: Flags  # (n,) whether all 64 nodes around the cell that begins at a node are known
+    origins: Floats  # (levels, 3) [m]
+    cells: Floats  # (levels,) [m]
+    shapes: Integers  # (levels, 3) nodes along each axis
+    begins: Integers  # (levels,) first row of each
+    charges: ChargeTree
+    surface: Floats  # (t, 3, 3) [m], the unit's triangles
+    tree: Tree  # over them
 
-    values: Floats
-    origins: Floats
-    cells: Floats
-    shapes: Integers
-    begins: Integers
+
+POTENTIAL_GRID_TYPE = record(
+    PotentialGrid,
+    float64[::1],
+    boolean[::1],
+    boolean[::1],
+    float64[:, ::1],
+    float64[::1],
+    int64[:, ::1],
+    int64[::1],
+    CHARGE_TREE_TYPE,
+    float64[:, :, ::1],
+    TREE_TYPE,
+)
 
 
 class Potential:
     """The potential of a unit's electrodes, each alone at 1 V.
 
-    Args:
-        unit: the electrodes.
-        surface: (n, 3, 3) [m], its triangles.
+    Attributes:
+        doubt: (k,) how much the extrapolation from two meshes changes each, as a share.
     """
 
-    def __init__(self, unit: Unit, surface: Floats) -> None:
-        self.surface, self.tree = surface, triangle_tree(surface)
-        self._unit = unit
-
-    @cached_property
-    def grids(self) -> Grids:
-        """The grids; they take seconds."""
-        low, high = self.surface.min(axis=(0, 1)), self.surface.max(axis=(0, 1))
-        parts, origins, cells, shapes, begins, total = [], [], [], [], [], 0
-        for level in range(_LEVELS):
-            cell = _CELL * 2.0**level
-            origin = low - _AROUND * cell
-            shape = np.ceil((high + _AROUND * cell - origin) / cell).astype(np.int64) + 1
-            axes = [origin[axis] + cell * np.arange(shape[axis]) for axis in range(3)]
-            points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-            parts.append(np.concatenate([self.distances(points)[:, None], self.summed(points)[0].T], axis=1))
-            origins.append(origin)
-            cells.append(cell)
-            shapes.append(shape)
-            begins.append(total)
-            total += len(points)
-        return Grids(
-            _padded(np.concatenate(parts)),
-            np.array(origins),
-            np.array(cells),
-            np.array(shapes, dtype=np.int64),
-            np.array(begins, dtype=np.int64),
+    def __init__(self, unit: Unit) -> None:
+        surface = np.ascontiguousarray(np.concatenate([s for e in unit.electrodes for s in e.surfaces]))
+        coarse, fine = unit.charged
+        k = len(unit.electrodes)
+        self.columns = 1 + k
+        weights = unit.extrapolated(0.0, 1.0), unit.extrapolated(1.0, 0.0)
+        charges = charge_tree([(fine.panels, weights[0] * fine.charges), (coarse.panels, weights[1] * coarse.charges)])
+        low, high = surface.min(axis=(0, 1)), surface.max(axis=(0, 1))
+        cell = max(_CELL, _FINEST * float(np.max(high - low)))
+        cells = cell * 2.0 ** np.arange(_LEVELS)
+        origins = low - _AROUND * cells[:, None]
+        shapes = np.ceil((high + _AROUND * cells[:, None] - origins) / cells[:, None]).astype(np.int64) + 1
+        counts = shapes.prod(axis=1)
+        total = int(counts.sum())
+        self.near = _NEAR * cell
+        self.doubt = _doubt(unit, low - self.near, high + self.near)
+        self._grid = PotentialGrid(
+            np.zeros(total * (self.columns + (-self.columns % 4))),
+            np.zeros(total, np.bool_),
+            np.zeros(total, np.bool_),
+            np.ascontiguousarray(origins),
+            cells,
+            np.ascontiguousarray(shapes),
+            np.cumsum(counts) - counts,
+            charges,
+            surface,
+            triangle_tree(surface),
         )
 
-    def summed(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the potentials (k, n) at points (n, 3), extrapolated, and those of the finer mesh."""
-        first, second = (point_potentials(points, mesh.panels, mesh.charges) for mesh in self._unit.charged)
-        return self._unit.extrapolated(first, second), second
+    @property
+    def surface(self) -> tuple[Floats, Tree]:
+        """The unit's triangles (n, 3, 3) [m] and the tree over them."""
+        return self._grid.surface, self._grid.tree
 
-    def distances(self, points: Floats) -> Floats:
-        """Return the distances (n,) [m] of points (n, 3)."""
-        return surface_distances(np.ascontiguousarray(points), self.surface, self.tree)
+    def at(self, points: Floats, *, exact: bool = False) -> tuple[Floats, Floats]:
+        """Return the potentials (n, k) at points (n, 3) [m] and their distances (n,) [m].
 
-    def interpolated(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the potentials (k, n) at points (n, 3) [m] and their distances (n,) [m]."""
-        g = self.grids
-        found = interpolated(points, g.values, g.origins, g.cells, g.shapes, g.begins)
-        k = len(self._unit.electrodes)
-        outside = np.flatnonzero(np.isnan(found[:, 0]))
-        if len(outside):
-            far = np.ascontiguousarray(points[outside])
-            found[outside, 1 : k + 1] = self.summed(far)[0].T
-            found[outside, 0] = self.distances(far)
-        return np.ascontiguousarray(found[:, 1 : k + 1].T), np.ascontiguousarray(found[:, 0])
+        Args:
+            points: in the unit's frame.
+            exact: whether potentials nearer than `near` are summed over panels.
+        """
+        with _filling:
+            found = looked_up(np.ascontiguousarray(points), self._grid, self.near if exact else 0.0)
+        return found[:, 1 : self.columns], np.ascontiguousarray(found[:, 0])
+
+    def proxies(self, points: Floats, areas: Floats, body: Integers, T: Floats, least: float) -> Floats:
+        """Return E (n, k) [m] of n poses, see `keyframes`.
+
+        Args:
+            points: (m, 3) [m], each in the frame of its body.
+            areas: (m,) [m^2].
+            body: (m,) of each.
+            T: (n, bodies, 4, 4), T_unit_body.
+            least: distance [m] that smaller ones count as.
+        """
+        with _filling:
+            found = sums_over_points(points, areas, body, np.ascontiguousarray(T), self._grid, least)
+        return np.ascontiguousarray(found[:, 1 : self.columns]) + 1e-300
 
 
-def _padded(values: Floats) -> Floats:
-    """Return columns with zeros beside them, up to a multiple of four."""
-    more = -values.shape[1] % 4
-    return np.ascontiguousarray(np.pad(values, ((0, 0), (0, more))))
+def _doubt(unit: Unit, low: Floats, high: Floats) -> Floats:
+    """Return by which share (k,) the extrapolation changes potentials on a box around the unit, in the mean square."""
+    t = (np.arange(_PROBES) + 0.5) / _PROBES
+    square = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
+    sides = [np.insert(square, axis, side, axis=1) for axis in range(3) for side in (0.0, 1.0)]
+    points = low + np.concatenate(sides) * (high - low)
+    coarse, fine = (point_potentials(points, mesh.panels, mesh.charges) for mesh in unit.charged)
+    phi = unit.extrapolated(coarse, fine)
+    return np.asarray(np.sqrt(((phi - fine) ** 2).sum(axis=1) / ((phi * phi).sum(axis=1) + 1e-300)))
 
 
 @leaf_kernel
@@ -131,39 +167,107 @@ def _add_four(total: Floats, share: float, weights: tuple[float, float, float, f
         total[k] += (a * first[k] + b * second[k]) + (c * third[k] + d * last[k])
 
 
-@entry(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int64[:, ::1], int64[::1])
 @kernel
-def interpolated(
-    points: Floats, values: Floats, origins: Floats, cells: Floats, shapes: Integers, begins: Integers
+def _sum(row: Floats, point: Floats, grid: PotentialGrid, R: Floats) -> None:
+    """Write distance and potentials at a point, summed over panels."""
+    k = grid.charges.moments.shape[2]
+    row[:] = 0.0
+    row[0] = distance_to_surface(point, grid.surface, grid.tree)
+    add_potentials(row[1 : 1 + k], point[0], point[1], point[2], grid.charges, R)
+
+
+@kernel
+def _complete(grid: PotentialGrid, level: int, at: Integers, point: Floats, R: Floats) -> None:
+    """Compute the 64 nodes around a cell that are not known."""
+    cell, columns = grid.cells[level], len(grid.values) // len(grid.known)
+    for i in range(at[0] - 1, at[0] + 3):
+        for j in range(at[1] - 1, at[1] + 3):
+            for k in range(at[2] - 1, at[2] + 3):
+                row = grid.begins[level] + (i * grid.shapes[level, 1] + j) * grid.shapes[level, 2] + k
+                if not grid.known[row]:
+                    point[0] = grid.origins[level, 0] + cell * i
+                    point[1] = grid.origins[level, 1] + cell * j
+                    point[2] = grid.origins[level, 2] + cell * k
+                    _sum(grid.values[columns * row : columns * (row + 1)], point, grid, R)
+                    grid.known[row] = True
+
+
+@leaf_kernel
+def _level_of(point: Floats, grid: PotentialGrid, at: Integers) -> int:
+    """Return the finest level that holds a point, and write the cell in which it is; -1 where none does."""
+    for level in range(len(grid.cells)):
+        inside = True
+        for axis in range(3):
+            at[axis] = math.floor((point[axis] - grid.origins[level, axis]) / grid.cells[level])
+            inside = inside and at[axis] >= 1 and at[axis] + 2 < grid.shapes[level, axis]
+        if inside:
+            return level
+    return -1
+
+
+@leaf_kernel
+def _blend(row: Floats, point: Floats, grid: PotentialGrid, level: int, at: Integers, begin: int) -> None:
+    """Write values between the nodes around a cell that begins at a node."""
+    cell = grid.cells[level]
+    wx = _weights((point[0] - grid.origins[level, 0]) / cell - at[0])
+    wy = _weights((point[1] - grid.origins[level, 1]) / cell - at[1])
+    wz = _weights((point[2] - grid.origins[level, 2]) / cell - at[2])
+    second, third, columns = grid.shapes[level, 1], grid.shapes[level, 2], len(row)
+    flat = grid.values
+    for c in range(columns):
+        row[c] = 0.0
+    for i in range(4):
+        for j in range(4):
+            first = (begin + ((i - 1) * second + j - 1) * third - 1) * columns
+            _add_four(row, wx[i] * wy[j], wz, flat[first : first + 4 * columns])
+
+
+@kernel
+def _interpolate(row: Floats, point: Floats, grid: PotentialGrid, at: Integers, node: Floats, R: Floats) -> None:
+    """Write values at a point: of the finest grid that holds it, or summed where none does."""
+    level = _level_of(point, grid, at)
+    if level < 0:
+        _sum(row, point, grid, R)
+        return
+    begin = grid.begins[level] + (at[0] * grid.shapes[level, 1] + at[1]) * grid.shapes[level, 2] + at[2]
+    if not grid.whole[begin]:
+        _complete(grid, level, at, node, R)
+        grid.whole[begin] = True
+    _blend(row, point, grid, level, at, begin)
+
+
+@entry(float64[:, ::1], POTENTIAL_GRID_TYPE, float64)
+@kernel
+def looked_up(points: Floats, grid: PotentialGrid, near: float) -> Floats:
+    """Return values (n, m) at points (n, 3), summed where they are nearer than `near` [m] to the unit."""
+    result = np.zeros((len(points), len(grid.values) // len(grid.known)))
+    at, node, R = np.zeros(3, np.int64), np.zeros(3), np.zeros(5)
+    for k in range(len(points)):
+        _interpolate(result[k], points[k], grid, at, node, R)
+        if result[k, 0] < near:
+            _sum(result[k], points[k], grid, R)
+    return result
+
+
+@entry(float64[:, ::1], float64[::1], int64[::1], float64[:, :, :, ::1], POTENTIAL_GRID_TYPE, float64)
+@kernel
+def sums_over_points(
+    points: Floats, areas: Floats, body: Integers, T: Floats, grid: PotentialGrid, least: float
 ) -> Floats:
-    """Return values (n, c) at points (n, 3) of the finest grid that holds each; NaN where none does."""
-    n, columns = len(points), values.shape[1]
-    result = np.full((n, columns), np.nan)
-    at = np.zeros(3, np.int64)
-    part = np.zeros(3)
-    for k in range(n):
-        for level in range(len(cells)):
-            inside = True
+    """Return E in columns 1 .. k of rows (n, m), see `Potential.proxies`."""
+    columns = len(grid.values) // len(grid.known)
+    result = np.zeros((len(T), columns))
+    at, node, R = np.zeros(3, np.int64), np.zeros(3), np.zeros(5)
+    point, row = np.zeros(3), np.zeros(columns)
+    for pose in range(len(T)):
+        for j in range(len(points)):
+            M = T[pose, body[j]]
             for axis in range(3):
-                x = (points[k, axis] - origins[level, axis]) / cells[level]
-                cell = math.floor(x)
-                inside = inside and cell >= 1 and cell + 2 < shapes[level, axis]
-                at[axis], part[axis] = cell, x - cell
-            if not inside:
-                continue
-            wx, wy, wz = _weights(part[0]), _weights(part[1]), _weights(part[2])
+                point[axis] = (
+                    M[axis, 0] * points[j, 0] + M[axis, 1] * points[j, 1] + M[axis, 2] * points[j, 2] + M[axis, 3]
+                )
+            _interpolate(row, point, grid, at, node, R)
+            share = areas[j] / max(row[0], least)
             for c in range(columns):
-                result[k, c] = 0.0
-            for i in range(4):
-                for j in range(4):
-                    share = wx[i] * wy[j]
-                    row = (
-                        begins[level]
-                        + ((at[0] - 1 + i) * shapes[level, 1] + at[1] - 1 + j) * shapes[level, 2]
-                        + at[2]
-                        - 1
-                    )
-                    four = values[row : row + 4].reshape(4 * columns)
-                    _add_four(result[k], share, wz, four)
-            break
+                result[pose, c] += share * row[c] * row[c]
     return result

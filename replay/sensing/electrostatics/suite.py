@@ -18,10 +18,11 @@ from replay.sensing.electrostatics import (
     bem,
     cholesky,
     circuit,
+    coupling,
     cut,
-    field,
     gap,
     influence,
+    nodes,
     potential_grid,
     products,
     proxy,
@@ -41,6 +42,9 @@ from replay.sensing.target import Target
 _TOLERANCE = 5e-3
 """Largest share of a reading by which a spline between frames that are solved may miss."""
 
+COARSER = {"bem": 1.0, "field": 1.4}
+"""How much coarser the unit's own meshes are than the finest that a method uses."""
+
 FEW = 5
 """Poses that are solved without asking whether splines would do."""
 
@@ -48,7 +52,7 @@ FEW = 5
 def kernels(*, method: str, savings: bool = True, **_options: Any) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `ElectrostaticSuite`."""
     shared = entries_of(containment, influence, cholesky, products, gap, circuit, proxy)
-    return (*shared, *entries_of(cut, field, potential_grid)) if method == "field" else shared
+    return (*shared, *entries_of(cut, nodes, coupling, potential_grid)) if method == "field" else shared
 
 
 class Solver(Protocol):
@@ -57,8 +61,8 @@ class Solver(Protocol):
     def read(self, placement: PosedBodies) -> bem.BemReading | None:
         """Return what bodies change in one pose; None where there is no answer."""
 
-    def proxy(self, placement: PosedBodies) -> Floats:
-        """Return E (k,) [m] of one pose, see `keyframes`."""
+    def proxies(self, T: Floats) -> Floats:
+        """Return E (n, k) [m] of n poses (n, bodies, 4, 4), see `keyframes`."""
 
 
 class Reference:
@@ -72,9 +76,9 @@ class Reference:
         """See `Solver`."""
         return bem.read(self._unit, placement)
 
-    def proxy(self, placement: PosedBodies) -> Floats:
+    def proxies(self, T: Floats) -> Floats:
         """See `Solver`."""
-        return self._proxy.of(placement)
+        return np.stack([self._proxy.of(poses) for poses in T])
 
 
 class ElectrostaticSuite:
@@ -116,7 +120,7 @@ class ElectrostaticSuite:
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
         self.method = method
-        self.stations = stations(self.sensors, self.targets)
+        self.stations = stations(self.sensors, self.targets, coarser=COARSER[method])
         self.solved = 0
         self._accuracy = accuracy
         self._tolerance = accuracy / 3.0 if method == "field" else _TOLERANCE
@@ -170,10 +174,11 @@ class ElectrostaticSuite:
             return readings[pose]
 
         if splines and len(track.poses) > FEW:
+            placed = np.array([placement.poses for placement in standing.placements])
             found = between_keys(
                 lambda frame: solve(int(track.pose_of[frame])),
-                np.stack([solver.proxy(placement) for placement in standing.placements])[track.pose_of],
-                pieces(_outlines(standing)[track.pose_of], standing.states[track.pose_of]),
+                solver.proxies(placed)[track.pose_of],
+                pieces(_outlines(station.bodies, placed)[track.pose_of], standing.states[track.pose_of]),
                 self._tolerance,
             )
             if found is not None:
@@ -184,11 +189,10 @@ class ElectrostaticSuite:
     def _solver(self, station: Station) -> Solver:
         """Return what solves the poses of a unit."""
         if station.link not in self._solvers:
-            made = (station.unit, station.surface, station.bodies)
             self._solvers[station.link] = (
-                Field(*made, behind=station.has_back, accuracy=self._accuracy)
+                Field(station.unit, station.bodies, behind=station.has_back, accuracy=self._accuracy)
                 if self.method == "field"
-                else Reference(*made)
+                else Reference(station.unit, station.surface, station.bodies)
             )
         return self._solvers[station.link]
 
@@ -232,17 +236,10 @@ class ElectrostaticSuite:
         columns.delta_output[:, at] = supply - voltage
 
 
-def _outlines(standing: Stand) -> Floats:
-    """Return corners of boxes around the bodies (n, 8 bodies, 3) [m] in each pose, in the unit's frame."""
-    boxes = [
-        _box(np.concatenate([shape.reshape(-1, 3) for shape in body.shapes])) for body in standing.placements[0].bodies
-    ]
-    return np.stack(
-        [
-            np.concatenate([transforms.apply(pose, box) for pose, box in zip(placement.poses, boxes, strict=True)])
-            for placement in standing.placements
-        ]
-    )
+def _outlines(bodies: Sequence[ConductorBody], T: Floats) -> Floats:
+    """Return corners of boxes around bodies (n, 8 bodies, 3) [m] in poses (n, bodies, 4, 4)."""
+    boxes = np.stack([_box(np.concatenate([shape.reshape(-1, 3) for shape in body.shapes])) for body in bodies])
+    return np.asarray(transforms.apply(T[:, :, None], boxes)).reshape(len(T), -1, 3)
 
 
 def _box(points: Floats) -> Floats:

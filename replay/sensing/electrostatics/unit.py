@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from replay.sensing.electrostatics.faces import OPEN, Faces, faces_of
 from replay.sensing.electrostatics.grading import cut_nodes, graded, grid
 from replay.sensing.electrostatics.influence import fill_influences, mean_potentials
 from replay.sensing.electrostatics.panels import Panels, chosen, joined
+from replay.sensing.electrostatics.potential_grid import Potential
 from replay.sensing.electrostatics.products import products
 from replay.sensing.electrostatics.refinement import near_tree, point_sample, refined
 
@@ -78,13 +80,15 @@ class Unit:
 
     Args:
         electrodes: at least one, each with a surface that has area.
+        coarser: factor on FINENESSES; panels may then be fewer, too.
 
     Raises:
         InvalidValue: an electrode without area, or electrodes that touch each other.
     """
 
-    def __init__(self, electrodes: Sequence[Electrode]) -> None:
+    def __init__(self, electrodes: Sequence[Electrode], *, coarser: float = 1.0) -> None:
         self.electrodes = tuple(electrodes)
+        self._coarser = coarser
         self._faces = [[faces_of(surface) for surface in electrode.surfaces] for electrode in self.electrodes]
         for electrode, found in zip(self.electrodes, self._faces, strict=True):
             if not found or not all(len(faces.panels.area) for faces in found):
@@ -124,8 +128,8 @@ class Unit:
     @cached_property
     def charged(self) -> tuple[Charged, Charged]:
         """The coarser and the finer mesh that phi comes from."""
-        scale = 1.0
-        while len(self.mesh(scale * FINENESSES[1])[1]) > MOST_PANELS:
+        scale = self._coarser
+        while len(self.mesh(scale * FINENESSES[1])[1]) > MOST_PANELS / self._coarser**2:
             scale *= 1.2
         coarse, fine = (self._charged(scale * fineness) for fineness in FINENESSES)
         return coarse, fine
@@ -134,15 +138,20 @@ class Unit:
     def matrix(self) -> Floats:
         """Maxwell's capacitances (k, k) [m] of the unit alone, extrapolated."""
         coarse, fine = self.charged
-        return fine.matrix + (fine.matrix - coarse.matrix) / _GAIN
+        return self.extrapolated(coarse.matrix, fine.matrix)
 
     def potential(self, panels: Panels) -> tuple[Floats, Floats]:
         """Return the mean potentials (k, n) on panels, each electrode alone at 1 V: extrapolated, and the fine one."""
         first, second = (mean_potentials(panels, mesh.panels, mesh.charges) for mesh in self.charged)
         return self.extrapolated(first, second), second
 
+    @cached_property
+    def around(self) -> Potential:
+        """The potential around the unit, at any point."""
+        return Potential(self)
+
     @staticmethod
-    def extrapolated(coarse: Floats, fine: Floats) -> Floats:
+    def extrapolated(coarse: Any, fine: Any) -> Any:
         """Return what potentials of both meshes say of a mesh without end."""
         return fine + (fine - coarse) / _GAIN
 
