@@ -61,7 +61,8 @@ class CapacitiveSensorPart(Part):
     faces: Literal["all", "facing"] = "all"
     """"facing" counts only triangles whose outside faces the plate."""
     back: tuple[Name, ...] = ()
-    """Shapes of the sensor's link that are a conductor behind the plates; only for the method bem."""
+    """Shapes of the sensor's link that are a conductor behind the plates; only for the methods field and
+    bem."""
     driven: Flag = False
     """Whether what is behind the plates has their voltage, as a guard electrode, and not 0 V."""
     ignore: tuple[Glob, ...] = ()

@@ -18,7 +18,7 @@ from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics.body import ConductorBody
-from replay.sensing.electrostatics.unit import Electrode, Unit
+from replay.sensing.electrostatics.unit import MOST_PANELS, Electrode, Unit
 from replay.sensing.target import Target
 
 FOUR_PI_EPSILON = 1.1126500560536183e-10
@@ -65,13 +65,15 @@ class Station:
         return np.ascontiguousarray(np.concatenate([*self.plates, self.behind]))
 
 
-def stations(sensors: Sequence[Any], targets: Sequence[Target], *, coarser: float = 1.0) -> tuple[Station, ...]:
+def stations(
+    sensors: Sequence[Any], targets: Sequence[Target], *, most_panels: int = MOST_PANELS
+) -> tuple[Station, ...]:
     """Return the sensors of a scene as units, in the order of their links.
 
     Args:
         sensors: as `sensing.capacitive.sensor.CapacitiveSensor`.
         targets: the sensed shapes.
-        coarser: of the units' meshes, see `unit.Unit`.
+        most_panels: of a unit's meshes, see `unit.Unit`.
 
     Raises:
         InvalidValue: sensors of one link that ignore other links, or drive what is behind them differently.
@@ -112,7 +114,7 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target], *, coarser: floa
                 plates=plates,
                 behind=behind,
                 driven=first.driven,
-                unit=kept_unit(electrodes, coarser),
+                unit=kept_unit(electrodes, most_panels),
                 bodies=tuple(bodies),
                 links=tuple(links),
                 objects=np.array(objects, dtype=np.intp),
@@ -124,16 +126,16 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target], *, coarser: floa
 _units: OrderedDict[bytes, Unit] = OrderedDict()
 
 
-def kept_unit(electrodes: Sequence[Electrode], coarser: float = 1.0) -> Unit:
+def kept_unit(electrodes: Sequence[Electrode], most_panels: int = MOST_PANELS) -> Unit:
     """Return a unit; one that this process made of the same surfaces comes with what was computed of it."""
-    digest = hashlib.sha256(f"{coarser!r}".encode())
+    digest = hashlib.sha256(f"{most_panels}".encode())
     for electrode in electrodes:
         digest.update(f"{len(electrode.surfaces)}".encode())
         for surface in electrode.surfaces:
             digest.update(f" {len(surface)} ".encode() + np.ascontiguousarray(surface).tobytes())
     key = digest.digest()
     if key not in _units:
-        _units[key] = Unit(electrodes, coarser=coarser)
+        _units[key] = Unit(electrodes, most_panels=most_panels)
         while len(_units) > _KEPT_UNITS:
             _units.popitem(last=False)
     _units.move_to_end(key)

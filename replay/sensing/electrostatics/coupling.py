@@ -10,7 +10,7 @@ from numba import float64, int64
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.numerics.triples import Triple
-from replay.sensing.electrostatics.memory import MEMORY_TYPE, Memory, recalled, remembered
+from replay.sensing.electrostatics.memory import MEMORY_TYPE, KnownInfluences, recalled, remembered
 from replay.sensing.electrostatics.nodes import ACROSS, NODES_TYPE, WITHIN, Nodes, node_mean
 
 
@@ -48,7 +48,7 @@ def _means(row: Floats, sums: Floats, weights: Floats, first: int) -> None:
 @leaf_kernel
 def _are_near(x: Floats, y: Floats, z: Floats, D: Floats, i: int, j: int) -> bool:
     a, b, c, size = x[i] - x[j], y[i] - y[j], z[i] - z[j], max(D[i], D[j])
-    return a * a + b * b + c * c <= ACROSS[1] * ACROSS[1] * size * size
+    return bool(a * a + b * b + c * c <= ACROSS[1] * ACROSS[1] * size * size)
 
 
 @leaf_kernel
@@ -59,7 +59,7 @@ def _fill_within(
     nodes: Nodes,
     which: Integers,
     begin: int,
-    memory: Memory,
+    memory: KnownInfluences,
     stack: Integers,
     shares: Floats,
 ) -> None:
@@ -91,8 +91,8 @@ def fill_influences(
     own: Integers,
     images: Nodes,
     image: Integers,
-    memory: Memory,
-    image_memory: Memory,
+    memory: KnownInfluences,
+    image_memory: KnownInfluences,
     into: Floats,
 ) -> None:
     """Write the upper triangle of the influences [1/m], the unit's nodes first.
@@ -153,8 +153,8 @@ def fill_influences(
 @kernel
 def place_below(nodes: Nodes, above: Integers, below: Integers) -> Integers:
     """Return, of each node (n,) of a cut, which node of a cut above it (m,) it is part of, or is."""
-    part = np.full(nodes.count[0], -1)
-    stack = np.zeros(nodes.count[0] + 1, np.int64)
+    part = np.full(nodes.made[0], -1)
+    stack = np.zeros(nodes.made[0] + 1, np.int64)
     for which in range(len(above)):
         stack[0] = above[which]
         size = 1

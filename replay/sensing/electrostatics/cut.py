@@ -29,7 +29,7 @@ _RESOLVED = 3e-3
 def _score(nodes: Nodes, node: int, square: float, distance: float, weight: float) -> float:
     r = 0.5 * nodes.panels.diameter[node]
     d = max(distance, 0.3 * r, _RESOLVED)
-    return weight * nodes.panels.area[node] * square * 4.0 * r * r / (d * d * d)
+    return float(weight * nodes.panels.area[node] * square * 4.0 * r * r / (d * d * d))
 
 
 @leaf_kernel

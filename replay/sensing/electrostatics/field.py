@@ -43,10 +43,10 @@ class _System(NamedTuple):
 
     influences: Floats  # (m + n, m + n) [1/m], the unit's nodes first; the upper triangle
     phi: Floats  # (k, n), the unit's potential at the bodies' nodes
-    shape: Integers  # (n,) of each
+    shape: Integers  # (n,) of each of these
 
 
-class Field:
+class FieldSolver:
     """A unit and its bodies, ready for any pose.
 
     Args:
@@ -111,7 +111,7 @@ class Field:
             own = own[self.potential.at(self._posed.panels.centroid[own])[1] >= RESOLVED]
         if len(own) == 0:
             return None
-        m, total = len(image), len(image) + len(own)
+        total = len(image) + len(own)
         fine = _System(np.empty((total, total)), self._phi(own), nodes.shape[own])
         memories = bodies.memory, unit.memory
         fill_influences(nodes, self._posed, body, own, unit.nodes, image, *memories, fine.influences)
@@ -163,10 +163,10 @@ def _above(fine: _System, part: Integers, areas: Floats) -> _System:
     """Return the equations of a cut above another, of whose nodes `part` tells what they are part of."""
     total, m = int(part.max()) + 1, len(areas) - len(fine.shape)
     first = int(part[:m].max()) + 1
-    weights = areas / np.bincount(part, weights=areas)[part]
+    weights: Floats = areas / np.bincount(part, weights=areas)[part]
     influences = np.zeros((total, total))
     means_below(fine.influences, part, weights, influences)
-    phi = np.stack([np.bincount(part[m:] - first, weights=weights[m:] * row) for row in fine.phi])
+    phi = np.stack([np.bincount(part[m:] - first, weights=weights[m:] * row).astype(np.float64) for row in fine.phi])
     shape = np.zeros(total - first, fine.shape.dtype)
     shape[part[m:] - first] = fine.shape
     return _System(influences, phi, shape)

@@ -48,7 +48,7 @@ class Nodes(NamedTuple):
     points: Floats  # (n, 4, 3) [m] that stand for it
     weights: Floats  # (n, 4), their sum is 1
     shape: Integers  # (n,) of the body
-    count: Integers  # (1,) of the nodes that there are
+    made: Integers  # (1,) of the nodes that there are
 
 
 NODES_TYPE = record(
@@ -81,15 +81,14 @@ def make_nodes(surfaces: list[Panels]) -> Nodes:
     for k, own in enumerate(members):
         nodes.shape[k] = shape_of[own[0]]
         _fill(nodes, k, panels, own)
-    nodes.count[0] = len(members)
+    nodes.made[0] = len(members)
     return nodes
 
 
 def _empty(size: int) -> Nodes:
     """Return nodes of which there are none yet."""
-    vectors = (np.zeros((size, 3)) for _ in range(3))
-    numbers = (np.zeros(size) for _ in range(2))
-    panels = Panels(*vectors, np.zeros(size, np.bool_), np.zeros((size, 3)), *numbers)
+    origin, u, v, centroid = (np.zeros((size, 3)) for _ in range(4))
+    panels = Panels(origin, u, v, np.zeros(size, np.bool_), centroid, np.zeros(size), np.zeros(size))
     points, weights = np.zeros((size, 4, 3)), np.zeros((size, 4))
     counts = np.zeros(size, np.int64), np.zeros(1, np.int64)
     return Nodes(panels, np.zeros(size, np.bool_), np.full(size, -1), points, weights, *counts)
@@ -97,11 +96,11 @@ def _empty(size: int) -> Nodes:
 
 def with_room(nodes: Nodes) -> Nodes:
     """Return a copy that halves can be added to."""
-    n = int(nodes.count[0])
+    n = int(nodes.made[0])
     result = _empty(n + _ROOM)
     for into, values in zip((*result.panels, *result[1:6]), (*nodes.panels, *nodes[1:6]), strict=True):
         into[:n] = values[:n]
-    result.count[0] = n
+    result.made[0] = n
     return result
 
 
@@ -199,8 +198,8 @@ def _write(nodes: Nodes, k: int, origin: Triple, u: Triple, v: Triple, four: boo
 def children(nodes: Nodes, k: int) -> int:
     """Return the first of the two children of a node, a panel's made if need be; -1 if there is no room for them."""
     if nodes.child[k] >= 0:
-        return nodes.child[k]
-    first = nodes.count[0]
+        return int(nodes.child[k])
+    first = int(nodes.made[0])
     if first + 2 > len(nodes.alone):
         return -1
     panels, four = nodes.panels, nodes.panels.four[k]
@@ -218,7 +217,7 @@ def children(nodes: Nodes, k: int) -> int:
         nodes.shape[j] = nodes.shape[k]
         _spread(nodes, j)
     nodes.child[k] = first
-    nodes.count[0] = first + 2
+    nodes.made[0] = first + 2
     return first
 
 

@@ -85,7 +85,7 @@ class Potential:
         charges = charge_tree([(fine.panels, weights[0] * fine.charges), (coarse.panels, weights[1] * coarse.charges)])
         low, high = surface.min(axis=(0, 1)), surface.max(axis=(0, 1))
         cell = max(_CELL, _FINEST * float(np.max(high - low)))
-        cells = cell * 2.0 ** np.arange(_LEVELS)
+        cells: Floats = cell * 2.0 ** np.arange(_LEVELS, dtype=np.float64)
         origins = low - _AROUND * cells[:, None]
         shapes = np.ceil((high + _AROUND * cells[:, None] - origins) / cells[:, None]).astype(np.int64) + 1
         counts = shapes.prod(axis=1)

@@ -30,20 +30,20 @@ from replay.sensing.electrostatics import (
 from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.circuit import output_voltages
 from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON, Station, stations
-from replay.sensing.electrostatics.contacts import Stand, stand
-from replay.sensing.electrostatics.field import Field
+from replay.sensing.electrostatics.contacts import stand
+from replay.sensing.electrostatics.field import FieldSolver
 from replay.sensing.electrostatics.keyframes import between_keys, pieces
 from replay.sensing.electrostatics.motion import PoseTrack, Solved
 from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.proxy import Proxy
-from replay.sensing.electrostatics.unit import Unit
+from replay.sensing.electrostatics.unit import MOST_PANELS, Unit
 from replay.sensing.target import Target
 
 _TOLERANCE = 5e-3
 """Largest share of a reading by which a spline between frames that are solved may miss."""
 
-COARSER = {"bem": 1.0, "field": 1.4}
-"""How much coarser the unit's own meshes are than the finest that a method uses."""
+PANELS = {"bem": MOST_PANELS, "field": 3000}
+"""The most panels of a unit's own meshes, by method."""
 
 FEW = 5
 """Poses that are solved without asking whether splines would do."""
@@ -120,7 +120,7 @@ class ElectrostaticSuite:
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
         self.method = method
-        self.stations = stations(self.sensors, self.targets, coarser=COARSER[method])
+        self.stations = stations(self.sensors, self.targets, most_panels=PANELS[method])
         self.solved = 0
         self._accuracy = accuracy
         self._tolerance = accuracy / 3.0 if method == "field" else _TOLERANCE
@@ -190,7 +190,7 @@ class ElectrostaticSuite:
         """Return what solves the poses of a unit."""
         if station.link not in self._solvers:
             self._solvers[station.link] = (
-                Field(station.unit, station.bodies, behind=station.has_back, accuracy=self._accuracy)
+                FieldSolver(station.unit, station.bodies, behind=station.has_back, accuracy=self._accuracy)
                 if self.method == "field"
                 else Reference(station.unit, station.surface, station.bodies)
             )

@@ -53,22 +53,22 @@ class Trees:
         self.roots = len(surfaces)
         if pieces:
             self._split()
-        self.known = int(self.nodes.count[0])
+        self.known = int(self.nodes.made[0])
         self._children = self.nodes.child[: self.known].copy()
         self.survey = np.flatnonzero(self._children < 0)
         self.memory = make_memory()
 
     def make_room(self, halves: int) -> None:
         """Forget what was added if there is no room for so many halves; what is made again is the same."""
-        if self.nodes.count[0] + halves > len(self.nodes.alone):
-            self.nodes.count[0] = self.known
+        if self.nodes.made[0] + halves > len(self.nodes.alone):
+            self.nodes.made[0] = self.known
             self.nodes.child[: self.known] = self._children
             self.nodes.child[self.known :] = -1
             self.memory = make_memory()
 
     def _split(self) -> None:
         nodes = self.nodes
-        heap = [(-nodes.panels.diameter[k], k) for k in range(int(nodes.count[0])) if nodes.child[k] < 0]
+        heap = [(-nodes.panels.diameter[k], k) for k in range(int(nodes.made[0])) if nodes.child[k] < 0]
         heapq.heapify(heap)
         while len(heap) < _SURVEY and -heap[0][0] > _PIECE:
             _, k = heapq.heappop(heap)

@@ -44,7 +44,7 @@ _NEAR = 0.25
 """A plate is near a face behind it when their distance is below this share of its shorter edge."""
 
 MOST_PANELS = 6000
-"""Of the finer mesh; beyond, both are made coarser."""
+"""Of the finer mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +80,15 @@ class Unit:
 
     Args:
         electrodes: at least one, each with a surface that has area.
-        coarser: factor on FINENESSES; panels may then be fewer, too.
+        most_panels: of the finer mesh that phi comes from; beyond, both are made coarser.
 
     Raises:
         InvalidValue: an electrode without area, or electrodes that touch each other.
     """
 
-    def __init__(self, electrodes: Sequence[Electrode], *, coarser: float = 1.0) -> None:
+    def __init__(self, electrodes: Sequence[Electrode], *, most_panels: int = MOST_PANELS) -> None:
         self.electrodes = tuple(electrodes)
-        self._coarser = coarser
+        self._most_panels = most_panels
         self._faces = [[faces_of(surface) for surface in electrode.surfaces] for electrode in self.electrodes]
         for electrode, found in zip(self.electrodes, self._faces, strict=True):
             if not found or not all(len(faces.panels.area) for faces in found):
@@ -128,8 +128,8 @@ class Unit:
     @cached_property
     def charged(self) -> tuple[Charged, Charged]:
         """The coarser and the finer mesh that phi comes from."""
-        scale = self._coarser
-        while len(self.mesh(scale * FINENESSES[1])[1]) > MOST_PANELS / self._coarser**2:
+        scale = 1.0
+        while len(self.mesh(scale * FINENESSES[1])[1]) > self._most_panels:
             scale *= 1.2
         coarse, fine = (self._charged(scale * fineness) for fineness in FINENESSES)
         return coarse, fine
@@ -138,7 +138,7 @@ class Unit:
     def matrix(self) -> Floats:
         """Maxwell's capacitances (k, k) [m] of the unit alone, extrapolated."""
         coarse, fine = self.charged
-        return self.extrapolated(coarse.matrix, fine.matrix)
+        return np.asarray(self.extrapolated(coarse.matrix, fine.matrix))
 
     def potential(self, panels: Panels) -> tuple[Floats, Floats]:
         """Return the mean potentials (k, n) on panels, each electrode alone at 1 V: extrapolated, and the fine one."""

@@ -9,8 +9,8 @@ import pytest
 
 from replay.sensing.electrostatics import bem, surveys
 from replay.sensing.electrostatics.body import ConductorBody
-from replay.sensing.electrostatics.field import Field
-from replay.sensing.electrostatics.suite import COARSER
+from replay.sensing.electrostatics.field import FieldSolver
+from replay.sensing.electrostatics.suite import PANELS
 from replay.sensing.electrostatics.unit import Electrode, Unit
 from tests.sensing.electrostatics.made_cases import (
     CASES,
@@ -27,7 +27,7 @@ QUICK = ("s_bare1", "s_bare2", "s_bare3")
 
 
 def fast(electrodes: list[Electrode]) -> Unit:
-    return Unit(electrodes, coarser=COARSER["field"])
+    return Unit(electrodes, most_panels=PANELS["field"])
 
 
 def check_case(name: str) -> None:
@@ -40,7 +40,7 @@ def check_case(name: str) -> None:
         electrodes.append(electrodes.pop(0))
         order = [*range(1, len(truth)), 0]
         truth = truth[np.ix_(order, order)]
-    found = Field(fast(electrodes), placement.bodies, behind=behind).read(placement)
+    found = FieldSolver(fast(electrodes), placement.bodies, behind=behind).read(placement)
     assert found is not None
     plates = len(truth) - behind
     value, error = PICO * found.increase[:plates, :plates], PICO * found.error[:plates, :plates]
@@ -77,9 +77,9 @@ def test_a_reading_does_not_depend_on_what_was_read_before(monkeypatch: pytest.M
         poses.append(placed(ball, poses=[pose]))
     electrodes = [Electrode("plate", (plate,))]
     monkeypatch.setattr(surveys, "_trees", OrderedDict())
-    found = [Field(fast(electrodes), [ball], behind=False).read(pose) for pose in poses]
+    found = [FieldSolver(fast(electrodes), [ball], behind=False).read(pose) for pose in poses]
     surveys._trees.clear()
-    back = Field(fast(electrodes), [ball], behind=False)
+    back = FieldSolver(fast(electrodes), [ball], behind=False)
     again = [back.read(pose) for pose in reversed(poses)][::-1]
     for each in surveys._trees.values():
         each.make_room(10**9)
@@ -97,7 +97,7 @@ def test_shares_of_two_bodies_add_up_and_a_floating_one_reads_less() -> None:
     found = []
     for earth in (np.inf, 0.0):
         bodies = (ConductorBody("near", (near,), earth), ConductorBody("far", (far,)))
-        reading = Field(unit, bodies, behind=False).read(placed(*bodies))
+        reading = FieldSolver(unit, bodies, behind=False).read(placed(*bodies))
         assert reading is not None
         assert reading.shares.sum(axis=0) == pytest.approx(reading.increase, rel=1e-9)
         found.append(reading.increase[0, 0])
@@ -110,7 +110,7 @@ def test_motions_are_within_their_error_of_the_reference(motion: str) -> None:
     plates = [shifted(rectangle(0.05, 0.1), x, 0.0, 0.0) for x in (-0.03, 0.03)]
     unit = Unit([Electrode(str(k), (plate,)) for k, plate in enumerate(plates)])
     body = ConductorBody("box", (box(0.08, 0.12, 0.04),), 0.0)
-    solver = Field(fast([*unit.electrodes]), [body], behind=False)
+    solver = FieldSolver(fast([*unit.electrodes]), [body], behind=False)
     for s in np.linspace(0.0, 1.0, 20):
         pose = np.eye(4)
         pose[2, 3] = 0.02 + (0.2 * (1.0 - s) if motion == "approach" else 0.02)
@@ -120,9 +120,9 @@ def test_motions_are_within_their_error_of_the_reference(motion: str) -> None:
             pose[:3, :3] = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
             pose[2, 3] = 0.07
         placement = placed(body, poses=[pose])
-        fast, reference = solver.read(placement), bem.read(unit, placement)
-        assert fast is not None and reference is not None
-        wrong = np.abs(fast.increase - reference.increase)
+        quick, reference = solver.read(placement), bem.read(unit, placement)
+        assert quick is not None and reference is not None
+        wrong = np.abs(quick.increase - reference.increase)
         allowed = np.sqrt(np.outer(*[reference.increase.diagonal()] * 2))
         assert (wrong <= 3.5e-2 * allowed).all()
-        assert (wrong <= fast.error + reference.error)[np.diag_indices(2)].all()
+        assert (wrong <= quick.error + reference.error)[np.diag_indices(2)].all()
