@@ -10,6 +10,7 @@ NIGHT := regress
 install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1) || $(call pip,$(1))
 pip = $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check -c constraints.txt $(1)
 PHANTOMS := pyskindose  # human bodies for the shipped scenarios; its own dependencies are not needed
+TRAJECTORIES := evo  # another tool that compares trajectories, for tests; its core needs NumPy and SciPy alone
 # Franka Emika's arm, Apache-2.0
 PANDA := cmeel.prefix/share/example-robot-data/robots/panda_description
 
@@ -28,6 +29,7 @@ $(VENV)/.run: pyproject.toml constraints.txt
 
 $(VENV)/.test: $(VENV)/.run
 	$(call install,-e '.[test]')
+	$(call install,--no-deps $(TRAJECTORIES))
 	@touch $@
 
 setup: $(VENV)/.run  ## create .venv and install the package and the phantoms
@@ -81,7 +83,7 @@ bench: setup  ## speed against error, ours and other engines' (about four minute
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png
 
-pictures: $(VENV)/.test system  ## make the README's pictures, three of them from the recordings that `make run` left
+pictures: $(VENV)/.test system  ## make the README's pictures, most of them from the recordings that `make run` left
 	mkdir -p scenarios/pictures
 	$(BIN)/replay view $(RECORDINGS)/carm_head_contact/carm_head_contact.rrd --screenshot scenarios/pictures/carm_head_contact.png --at 3.6
 	$(BIN)/replay view $(RECORDINGS)/carm_parking/carm_parking.rrd --screenshot scenarios/pictures/carm_parking.png --at 4.2
@@ -89,7 +91,10 @@ pictures: $(VENV)/.test system  ## make the README's pictures, three of them fro
 	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.thesis --model thesis2015 --no-rrd --overwrite
 	$(BIN)/replay run scenarios/carm_parking.yaml -o $(RECORDINGS)/.ours --no-rrd --overwrite
 	$(BIN)/replay diff $(RECORDINGS)/.thesis $(RECORDINGS)/.ours --rules scenarios/rules.yaml --html $(RECORDINGS)/.html || test $$? = 1
-	$(BIN)/python -m tests.pictures $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/thesis_and_ours.png
+	$(BIN)/python -m tests.pictures signal $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/thesis_and_ours.png
+	$(BIN)/python -m tests.pictures reaction $(RECORDINGS) scenarios/pictures/reaction_time.png
+	$(BIN)/replay compare scenarios/carm_parking_measured.yaml --html $(RECORDINGS)/.html
+	$(BIN)/python -m tests.pictures signal $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/beside_the_machine.png
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
 	$(BIN)/python -m pytest -m soak

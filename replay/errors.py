@@ -74,6 +74,16 @@ class ScenarioError(ReplayError):
         return "\n".join(str(problem) for problem in self.problems)
 
 
+class UndeterminedClockError(ReplayError):
+    """A log's clock is to be found from its signals, and they do not tell it."""
+
+    def __init__(self, problem: Problem, reason: str, candidates: Sequence[float]) -> None:
+        self.problem = problem
+        self.reason = reason
+        self.candidates = tuple(candidates)
+        super().__init__(str(problem))
+
+
 class MotionLimitError(ReplayError):
     """A script drives a joint beyond one of its limits."""
 

@@ -20,6 +20,7 @@ ROOMS = (
     "geometry",
     "logs",
     "kinematics",
+    "alignment",
     "collision",
     "sensing",
     "guarding",
@@ -35,6 +36,7 @@ ROOMS = (
 )
 ENTRANCES = ("__init__", "__main__")
 STRANGERS = {("collision", "sensing"), ("sensing", "collision"), ("logs", "scenario"), ("kinematics", "logs")}
+STRANGERS |= {("alignment", other) for other in ("language", "geometry", "logs", "kinematics")}
 
 
 def room_of(path: Path) -> str:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import replay
 from replay import guarded, simulation
 from replay.batch.case import CaseOrder, CaseStatus, describe, run_case
+from replay.batch.run import Execution, run_all
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.comparison.effects import effects
@@ -313,6 +315,20 @@ def test_sweeps_over_guards(tmp_path: Path) -> None:
     assert ends[1] - ends[0] == pytest.approx(0.03, rel=1e-9)
 
 
+def test_recordings_with_guards_are_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
+    grid = "sweep: {grid: {guards.stop.reaction: [0 ms, 100 ms], sensors.distance.tip.signal.noise.seed: [1, 2]}}\n"
+    path = tmp_path / "cart.yaml"
+    path.write_bytes(sources(SEVERAL, signal=NOISE, duration="4 s", more=grid)["cart.yaml"])
+    cases = load_cases(path)
+    recordings = []
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        assert run_all(cases, folder, rrd=False, execution=Execution(workers=workers)).passed
+        recordings.append([(folder / made.name / f"{made.name}.mcap").read_bytes() for made in cases])
+    assert recordings[0] == recordings[1]
+    assert len(set(recordings[0])) == 4
+
+
 def test_the_protective_separation_follows_the_speed() -> None:
     def first(when: str, place: float) -> tuple[float, float]:
         asked = f"separation: {{method: iso13855, K: 0.4 m/s, C: 0.1 m, {when}}}"
@@ -325,3 +341,40 @@ def test_the_protective_separation_follows_the_speed() -> None:
     for when, place in (("distance: tip", 0.93), ("pair: [cart, wall]", 0.94)):
         near, far = first(when, place)
         assert near < wanted <= far
+
+
+STILL = """version: 1
+name: still
+rate: 60 Hz
+duration: 0.1 s
+links:
+  wall: {{pose: {{xyz: [1, 0, 0]}}, shapes: {{slab: {{type: cuboid, size: [2 cm, 1, 1]}}}}}}
+  cart:
+    joint: {{type: prismatic, axis: [1, 0, 0], velocity: 0.3, acceleration: 1}}
+sensors:
+  distance:
+    tip:
+      link: cart
+      pose: {{xyz: [6 cm, 0, 0], rpy: [0, 90 deg, 0]}}
+      aperture: 20 deg
+      range: 2
+      signal: {{noise: {{std: 2 mm, seed: 0}}}}
+guards:
+  stop: {{when: {{distance: tip, below: {below}}}, stop: [cart]}}
+sweep: {{grid: {{sensors.distance.tip.signal.noise.seed: {{from: 1, count: {count}}}}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("deviations", "count"), [(1.5, 200), pytest.param(3.0, 10_000, marks=pytest.mark.soak)], ids=["200", "10000"]
+)
+def test_sweeps_over_seeds_stop_without_need_as_often_as_chance_says(
+    tmp_path: Path, deviations: float, count: int
+) -> None:
+    path = tmp_path / "still.yaml"
+    path.write_text(STILL.format(below=0.93 - deviations * 2e-3, count=count))
+    frames = 7
+    stopped = sum(any(block.guards.state.any() for block in replay.simulate(made)) for made in load_cases(path))
+    chance = 1.0 - (1.0 - stats.norm.cdf(-deviations)) ** frames
+    low, high = stats.binom.ppf([1e-4, 1.0 - 1e-4], count, chance)
+    assert low <= stopped <= high

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 import replay
+from replay import simulation
 from replay.scenario.methods import BUILTIN_MODELS
 from replay.scenario.scene import build
 from replay.simulation import BLOCK_FRAMES, Simulation, block_frames
+from tests.amounts import COMPILED
+
+RATE, BLOCK = (100, BLOCK_FRAMES) if COMPILED else (8, 20)
+"""Frames a second, and in a block: two blocks and a part of one."""
+FRAMES = 6 * RATE + 1
 
 SCENE = """
 version: 1
 name: swing
-rate: 100 Hz
+rate: RATE
 duration: 6 s
 links:
   room: {pose: {xyz: ROOM}}
@@ -35,7 +41,7 @@ sensors:
 
 def scenario(tmp_path, text, room="[0, 0, 0]"):
     path = tmp_path / "swing.yaml"
-    path.write_text(text.replace("ROOM", room))
+    path.write_text(text.replace("ROOM", room).replace("RATE", str(RATE)))
     return replay.load(path)
 
 
@@ -52,15 +58,16 @@ def columns(block):
 
 
 @pytest.fixture
-def swing(tmp_path):
+def swing(tmp_path, monkeypatch):
+    monkeypatch.setattr(simulation, "BLOCK_FRAMES", BLOCK)
     return scenario(tmp_path, SCENE + SENSORS)
 
 
 def test_blocks_hold_all_frames_once_and_in_order(swing):
     blocks = list(replay.simulate(swing))
-    assert [len(block.time) for block in blocks] == [BLOCK_FRAMES, BLOCK_FRAMES, 601 - 2 * BLOCK_FRAMES]
-    assert [block.first for block in blocks] == [0, BLOCK_FRAMES, 2 * BLOCK_FRAMES]
-    assert np.concatenate([block.time for block in blocks]).tolist() == [k * 10_000_000 for k in range(601)]
+    assert [len(block.time) for block in blocks] == [BLOCK, BLOCK, FRAMES - 2 * BLOCK]
+    assert [block.first for block in blocks] == [0, BLOCK, 2 * BLOCK]
+    assert np.concatenate([block.time for block in blocks]).tolist() == [k * 10**9 // RATE for k in range(FRAMES)]
 
 
 @pytest.mark.parametrize(("pairs", "frames"), [(0, 256), (319, 256), (32_768, 256), (179_700, 46), (10**8, 1)])

@@ -93,6 +93,8 @@ def plan_acceptance(directory: Path, baseline: Path, chosen: Accepted = ALL) -> 
             for name, entry in run["scenarios"].items()
             if chosen(name, causes.get(name, ""))
         }
+    except PermissionError as error:
+        raise InvalidValue("RUNDIR", directory, f"has a run.json that cannot be read: {error.strerror}") from None
     except (OSError, ValueError):
         raise InvalidValue("RUNDIR", directory, "is no run folder: it has no run.json of replay") from None
     if run["interrupted"]:

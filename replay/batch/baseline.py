@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from replay.errors import InvalidValue, RecordingError
 from replay.json_text import read_json_file
 from replay.language.fields import is_title
 from replay.logs.mcap_reader import McapLog
-from replay.logs.part_file import append_lines, json_line, refuse_link, write_error, write_file
+from replay.logs.part_file import append_lines, json_line, refuse_link, remove_folder, write_error, write_file
 from replay.recording.reader import read_provenance
 from replay.recording.slim import OBJECTS, is_digest, write_slim
 
@@ -71,13 +70,14 @@ class Baseline:
             try:
                 if line := self._staged_line():
                     self._put_in_place(line)
-                shutil.rmtree(self._staging, ignore_errors=True)
+                remove_folder(self._staging)
                 self._put_in_place(self._stage(entries, reason, now))
             except OSError as error:
-                raise write_error(self.directory, error) from None
+                named = Path(error.filename) if isinstance(error.filename, str) else self.directory
+                raise write_error(named, error) from None
             finally:
                 if not self._staged_line():
-                    shutil.rmtree(self._staging, ignore_errors=True)
+                    remove_folder(self._staging)
                 self._remove_unneeded()
                 with contextlib.suppress(OSError):
                     (self.directory / OBJECTS).rmdir()
@@ -177,13 +177,17 @@ def _ends_in(file: Path, data: bytes) -> bool:
 
 def check_name(name: str) -> None:
     """Raise InvalidValue unless a name, as a run.json may hold any, is one that scenarios and their folders have."""
-    if not is_title(name) or name == LOG:
+    if not is_title(name):
         raise InvalidValue("scenario", repr(name), "is no scenario's name, which is that of a folder and no path")
 
 
 def check_scenario(recording: Path, name: str) -> None:
     """Raise RecordingError unless a recording is a file, not a link to one, and of the scenario of that name."""
-    if recording.is_symlink() or recording.parent.is_symlink():
+    try:
+        linked = recording.is_symlink() or recording.parent.is_symlink()
+    except OSError as error:
+        raise RecordingError(str(recording), f"cannot be read: {error.strerror}") from None
+    if linked:
         raise RecordingError(str(recording), "is a link, or in a folder that is one, and not a file of the run")
     with McapLog(recording) as log:
         found = read_provenance(log).scenario

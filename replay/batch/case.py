@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from replay.errors import NoSpaceError, ReplayError, ScenarioError, count
+from replay.errors import NoSpaceError, ReplayError, ScenarioError, UndeterminedClockError, count
 from replay.recording.record import Progress, RecordedPaths
 from replay.scenario.expectation_check import ExpectationCheck, Outcome
 from replay.scenario.guard_outcomes import lines
@@ -163,6 +163,7 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         first = FirstFrame(scenario, scene.layout)
         blocks = _checked(simulation.blocks(), check, unseen, measures, first, reactions)
         recordings = record_blocks(scene, blocks, order.folder, rrd=order.rrd, overwrite=True, progress=progress)
+        by_machine, told = _beside_machine(scenario, recordings.mcap)
     except ReplayError as error:
         seconds = time.perf_counter() - begin
         return CaseResult(
@@ -183,12 +184,35 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
         recordings=recordings,
         counters=dataclasses.asdict(simulation.collision.counters) if simulation.collision else {},
         seconds=time.perf_counter() - begin,
-        notes=(*scene.notes, *(n for suite in simulation.suites.values() for n in suite.notes()), *first.lines()),
+        notes=(
+            *scene.notes,
+            *(n for suite in simulation.suites.values() for n in suite.notes()),
+            *first.lines(),
+            *told,
+        ),
         between_frames=unseen.lines(),
-        measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results()),
+        measures=(*(outcome.measure for outcome in outcomes if outcome.measure), *measures.results(), *by_machine),
         guards=tuple(stop.as_json() for stop in stops),
         reactions=tuple(lines(stops)),
     )
+
+
+def _beside_machine(scenario: Scenario, recording: Path) -> tuple[tuple[Measure, ...], tuple[str, ...]]:
+    """Return how far a recording is from the machine's log that its scenario names, as numbers, and what to note.
+
+    That a log does not tell its clock is no failure of the simulation: it is noted.
+    """
+    if scenario.measured is None:
+        return (), ()
+    from replay.comparison.measured.measures import measures_of
+    from replay.comparison.measured.source import MeasuredSource, compare_scenario
+
+    source = MeasuredSource.of_scenario(scenario)
+    assert source is not None
+    try:
+        return measures_of(compare_scenario(recording, scenario, source)), ()
+    except UndeterminedClockError as error:
+        return (), (str(error),)
 
 
 def describe(result: CaseResult) -> list[str]:

@@ -78,6 +78,11 @@ class Finding:
         kept = tuple(Effect(e.severity, e.size, e.text, e.subject, e.signals[:1], e.at) for e in effects[:_KEPT])
         return Finding(baseline, kept, len(effects), causes, report[:_REPORT])
 
+    def with_effects(self, effects: Sequence[Effect], report: str) -> Finding:
+        """Return the same with what else is to be seen, the worst first, and another report."""
+        kept = sorted([*self.effects, *effects], key=lambda effect: (effect.severity, -effect.size))[:_KEPT]
+        return replace(self, effects=tuple(kept), count=self.count + len(effects), report=report[:_REPORT])
+
     def as_json(self) -> dict[str, Any]:
         """Return what run.json holds of it: the worst effect and the causes."""
         told = ((key, getattr(self.causes, key)) for key in ("inputs", "model", "libraries", "code"))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from replay.batch import failure_kind
+from replay.batch.case import CaseResult
 from replay.batch.judged import Judged, RegressVerdict
 from replay.comparison.effects import Severity
 
@@ -37,35 +38,42 @@ class CauseGroup:
 
 def groups(judged: Iterable[Judged]) -> tuple[CauseGroup, ...]:
     """Return the groups of the scenarios that need attention."""
+    failing = [item for item in judged if not item.verdict.fine]
+    kinds = failure_kind.kinds({item.name: item.message for item in failing})
     found: dict[tuple[bool, tuple[str, ...]], list[Judged]] = {}
-    names: dict[tuple[bool, tuple[str, ...]], str] = {}
-    for item in judged:
-        if not item.verdict.fine:
-            explained, key, name = _cause(item)
-            found.setdefault((explained, key), []).append(item)
-            names[explained, key] = name
+    for item in failing:
+        found.setdefault(_cause(item, kinds[item.name]), []).append(item)
     made = [
-        CauseGroup(names[key], key[0], tuple(sorted(members, key=lambda item: item.order)))
-        for key, members in found.items()
+        CauseGroup(_name(members), explained, tuple(sorted(members, key=lambda item: item.order)))
+        for (explained, _), members in found.items()
     ]
     return tuple(sorted(made, key=lambda group: group.order))
 
 
-def _cause(item: Judged) -> tuple[bool, tuple[str, ...], str]:
-    """Return whether a scenario's failure is explained, what tells it from others, and its name."""
+def _cause(item: Judged, kind: str) -> tuple[bool, tuple[str, ...]]:
+    """Return whether a scenario's failure is explained, and what tells it from others."""
     if item.finding is not None and item.finding.told_of:
         causes = item.finding.causes
-        return bool(causes.changes), causes.changes or (causes.name,), causes.name
+        return bool(causes.changes), causes.changes or (causes.name,)
     if item.verdict is RegressVerdict.BROKEN and item.result is not None:
-        broken = tuple(outcome.expectation for outcome in item.result.outcomes if not outcome.passed)
-        return False, ("broken", *broken), f"broken: {'; '.join(broken)}"
+        return False, ("broken", *_broken(item.result))
     if item.verdict is RegressVerdict.MISSING:
-        return True, ("missing",), "no baseline yet"
-    reason = _without_particulars(item)
-    return False, (item.verdict.value, reason), f"{item.verdict.value}: {reason}" if reason else item.verdict.value
+        return True, ("missing",)
+    return False, (item.verdict.value, kind)
 
 
-def _without_particulars(item: Judged) -> str:
-    """Return why a scenario failed, without what is its own alone: its name, paths, numbers."""
-    line = (item.message.splitlines() or [""])[0].replace(item.name, "...")
-    return re.sub(r"\S*/\S+", "...", re.sub(r"\b\d[\d.e+-]*\b", "#", line))[:200]
+def _name(members: Sequence[Judged]) -> str:
+    """Return what scenarios of one cause have in common."""
+    item = members[0]
+    if item.finding is not None and item.finding.told_of:
+        return item.finding.causes.name
+    if item.verdict is RegressVerdict.BROKEN and item.result is not None:
+        return f"broken: {'; '.join(_broken(item.result))}"
+    if item.verdict is RegressVerdict.MISSING:
+        return "no baseline yet"
+    reason = failure_kind.in_common([member.message for member in members])
+    return f"{item.verdict.value}: {reason}" if reason else item.verdict.value
+
+
+def _broken(result: CaseResult) -> tuple[str, ...]:
+    return tuple(outcome.expectation for outcome in result.outcomes if not outcome.passed)

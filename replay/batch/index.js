@@ -1,5 +1,7 @@
 "use strict";
-// Shows the rows of a night: those that fit what is asked for, a hundred at a time; details are loaded when opened.
+// Shows the rows of a night: those that fit what is asked for, first a screenful and then a hundred at a time; details are
+// loaded when opened.
+const FIRST = 30;
 const STEP = 100;
 const list = document.getElementById("rows");
 const search = document.getElementById("search");
@@ -12,7 +14,9 @@ let shown = 0;
 
 async function unpack() {
   const packed = document.getElementById("data").textContent.trim();
-  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  const letters = atob(packed);
+  const bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < bytes.length; k++) bytes[k] = letters.charCodeAt(k); // Uint8Array.from makes a text of each letter
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return JSON.parse(await new Response(stream).text());
 }
@@ -78,12 +82,12 @@ function update() {
   matching = data.rows.filter((row) => fits(row, words, verdict, ...chosen));
   list.replaceChildren();
   shown = 0;
-  extend();
+  extend(FIRST);
 }
 
-function extend() {
-  list.append(...matching.slice(shown, shown + STEP).map(element));
-  shown = Math.min(shown + STEP, matching.length);
+function extend(step = STEP) {
+  list.append(...matching.slice(shown, shown + step).map(element));
+  shown = Math.min(shown + step, matching.length);
   more.hidden = shown >= matching.length;
   status.textContent = `${matching.length} of ${data.rows.length} scenarios${more.hidden ? "" : `, ${shown} shown`}`;
 }
@@ -128,7 +132,7 @@ async function begin() {
       list.scrollIntoView();
     });
   }
-  more.addEventListener("click", extend);
+  more.addEventListener("click", () => extend());
   new IntersectionObserver((seen) => seen.some((one) => one.isIntersecting) && !more.hidden && extend()).observe(more);
   document.addEventListener("keydown", key);
   document.documentElement.dataset.ready = Math.round(performance.now());

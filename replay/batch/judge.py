@@ -15,11 +15,16 @@ from replay.batch.case_folder import LOG
 from replay.batch.drawings import Album
 from replay.batch.finding import Finding
 from replay.batch.judged import OVERLAY, PAGE, Judged, RegressVerdict
+from replay.batch.raised import told
 from replay.batch.report_case import case_page
 from replay.comparison import wording
 from replay.comparison.causes import Causes, causes
 from replay.comparison.difference import DiffVerdict
 from replay.comparison.effects import effects, headline
+from replay.comparison.measured.effects import effects_of, worst
+from replay.comparison.measured.report_text import lines
+from replay.comparison.measured.result import MeasuredComparison
+from replay.comparison.measured.source import MeasuredSource, compare_scenario
 from replay.comparison.overlay import write_overlay
 from replay.comparison.plots import Plot, plots
 from replay.comparison.report_text import text
@@ -81,13 +86,35 @@ class Judge:
         if not result.status.recorded or result.recordings is None:
             return self.failed(result, scenario.tags)
         item, case, drawn = self._compared(scenario, result)
+        item, machine = self._beside_machine(scenario, item)
         if result.status is CaseStatus.BROKEN and item.verdict in _KNOWN:
             if case is not None and item.finding is not None and not item.finding.count:  # it may be expected anew
                 item = dataclasses.replace(item, finding=Finding(case.baseline, causes=_why(case)[0]))
             broken = [f"{o.expectation} ({o.detail})" for o in result.outcomes if not o.passed]
             message = "; ".join([*broken, *([item.message] if item.message else [])])
             item = dataclasses.replace(item, verdict=RegressVerdict.BROKEN, message=message)
-        return self._with_page(dataclasses.replace(item, tags=scenario.tags), case, drawn)
+        return self._with_page(dataclasses.replace(item, tags=scenario.tags), case, drawn, machine)
+
+    def _beside_machine(self, scenario: Scenario, item: Judged) -> tuple[Judged, MeasuredComparison | None]:
+        """Return the verdict with what the machine's log says, if the scenario names one; a failure stays one."""
+        source = MeasuredSource.of_scenario(scenario)
+        if source is None or item.result is None or item.result.recordings is None:
+            return item, None
+        found: MeasuredComparison | None = None
+        try:
+            found = compare_scenario(item.result.recordings.mcap, scenario, source, rules=self._rules)
+        except ReplayError as error:
+            verdict, told = RegressVerdict.FAILED, str(error)
+        else:
+            if found.verdict is not DiffVerdict.DIFFERENT:
+                return item, found
+            verdict, told = RegressVerdict.DIFFERENT, f"beside the machine: {worst(found)}"
+            if item.finding is not None:
+                report = "\n".join([*filter(None, [item.finding.report]), *lines(found)])
+                item = dataclasses.replace(item, finding=item.finding.with_effects(effects_of(found), report))
+        message = "; ".join(filter(None, [item.message, told]))
+        kept = item.verdict if not item.verdict.fine and item.verdict is not RegressVerdict.DIFFERENT else verdict
+        return dataclasses.replace(item, verdict=kept, message=message), found
 
     def failed(self, result: CaseResult, tags: tuple[str, ...] = ()) -> Judged:
         """Return the verdict of a scenario that has no recording, and write its page; NoSpaceError as `judge`."""
@@ -149,12 +176,15 @@ class Judge:
             return [_odd("both runs cannot be shown", error, case.candidate)]
         return []
 
-    def _with_page(self, item: Judged, case: Case | None, drawn: tuple[Plot, ...]) -> Judged:
+    def _with_page(
+        self, item: Judged, case: Case | None, drawn: tuple[Plot, ...], machine: MeasuredComparison | None = None
+    ) -> Judged:
         """Write a scenario's page; return the scenario, with what went wrong."""
         folder = self._directory / item.name
         shown, all_shown = self._album.keep(drawn)
         try:
-            page = case_page(item, case, shown, folder=folder, again=self._again(item.name), undrawn=not all_shown)
+            again, undrawn = self._again(item.name), not all_shown
+            page = case_page(item, case, shown, machine, folder=folder, again=again, undrawn=undrawn)
             write_file(folder / PAGE, page)
         except NoSpaceError:
             raise
@@ -187,4 +217,4 @@ def _odd(what: str, error: Exception, candidate: Path) -> str:
     with contextlib.suppress(ReplayError):
         trace = "".join(traceback.format_exception(error)).splitlines()
         append_lines(candidate.with_name(LOG), map(printable, trace))
-    return f"{what}: {type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{what}: {told(error)}"

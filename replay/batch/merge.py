@@ -7,6 +7,7 @@ import datetime
 import os
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NotRequired
 
@@ -22,6 +23,7 @@ from replay.batch.written import RESULT, read_result
 from replay.comparison.run_folder import RUN
 from replay.errors import InvalidValue
 from replay.json_text import read_json_file, typed
+from replay.logs.part_file import write_error
 from replay.recording.record import RecordedPaths
 
 
@@ -121,6 +123,8 @@ def merge(parts: Sequence[Path], directory: Path) -> Regression:
 def _read(part: Path) -> _Part:
     try:
         return typed(read_json_file(part / RUN, surrogates=True), _Part)
+    except PermissionError as error:
+        raise InvalidValue("RUNDIR", part, f"has a run.json that cannot be read: {error.strerror}") from None
     except (OSError, ValueError):
         raise InvalidValue("RUNDIR", part, "holds no run.json of a `replay regress` that came to its end") from None
 
@@ -143,14 +147,32 @@ def _moment(part: Path, values: _Part) -> datetime.datetime:
 
 def _bring(source: Path, target: Path) -> None:
     """Link or copy the files of a scenario's folder; what is no file of it is left."""
-    target.mkdir(parents=True, exist_ok=True)
-    for file in sorted(source.iterdir()) if source.is_dir() and not source.is_symlink() else ():
-        if file.is_symlink() or not file.is_file():
-            continue
+    try:
+        there = source.is_dir() and not source.is_symlink()
+        files = [file for file in sorted(source.iterdir()) if file.is_file() and not file.is_symlink()] if there else []
+    except OSError as error:
+        raise InvalidValue("RUNDIR", source, f"cannot be looked through: {error.strerror}") from None
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise write_error(target, error) from None
+    for file in files:
         try:
             os.link(file, target / file.name)
         except OSError:
-            shutil.copyfile(file, target / file.name)
+            _copy(file, target / file.name)
+
+
+def _copy(file: Path, target: Path) -> None:
+    try:
+        stream = file.open("rb")
+    except OSError as error:
+        raise InvalidValue("RUNDIR", file, f"cannot be read: {error.strerror}") from None
+    try:
+        with stream, target.open("wb") as copy:
+            shutil.copyfileobj(stream, copy)
+    except OSError as error:
+        raise write_error(target, error) from None
 
 
 def _judged(name: str, entry: _Verdict, ran: _Scenario | None, directory: Path) -> Judged:
@@ -165,10 +187,16 @@ def _judged(name: str, entry: _Verdict, ran: _Scenario | None, directory: Path) 
     if ran is not None:
         timed: dict[str, Any] = {"seconds": ran["seconds"], "memory": ran["memory"]}
         result = CaseResult(name, status, error=ran.get("error", ""), **timed)
-        with contextlib.suppress(OSError, ValueError):
-            paths = RecordedPaths(folder / f"{name}.mcap", None)
-            known = CaseResult.from_json(read_result(folder / RESULT), paths)
-            result = CaseResult(**{**vars(known), **timed, "reused": False})
+        try:
+            known = CaseResult.from_json(read_result(folder / RESULT), RecordedPaths(folder / f"{name}.mcap", None))
+            if (known.name, known.status) != (name, status):
+                raise ValueError(f"is of {known.name!r}, {known.status.value}")
+            result = replace(known, **timed, reused=False)
+        except FileNotFoundError:  # one that has not ended has none
+            pass
+        except (OSError, ValueError) as error:
+            note = f"its {RESULT} is left out: {error}"
+            result = replace(result, notes=(note,))
     return Judged(
         name, verdict, entry.get("message", ""), result, finding, entry.get("source", ""), tuple(entry.get("tags", ()))
     )

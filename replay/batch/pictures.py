@@ -16,7 +16,7 @@ from replay.recording.picture import picture
 
 _SIZE = (1200, 600)
 _SECONDS = 180.0
-"""All pictures of a night may take so long; one takes 15 to 30 s."""
+"""All pictures of a night may take so long; one takes 5 to 30 s."""
 
 
 def take_pictures(judged: Iterable[Judged], directory: Path, most: int, watch: Watch) -> None:

@@ -57,10 +57,10 @@ def kernels_for(needs: Needs, *, savings: bool = True) -> tuple[Any, ...]:
 
         found += entries_of(tree, mesh, facets, convexity, closing, containment)
     if needs.collision:
-        from replay.collision import pipeline
+        from replay.collision import engines
 
         version = model.collision
-        found += pipeline.kernels(
+        found += engines.kernels(
             bounds=version.bounds,
             narrowphase=version.narrowphase,
             pieces=version.pieces,

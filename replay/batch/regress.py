@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from replay.batch.watch import Unwatched, Watch
 from replay.comparison.log_changes import same_messages
 from replay.comparison.rules import Rules
 from replay.errors import InvalidValue, count
+from replay.logs.part_file import remove_folder
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -166,7 +166,7 @@ def _forget(directory: Path, names: Sequence[str], *, drawings: bool) -> None:
     for file in (*(directory / report for report in REPORTS), *shown):
         with contextlib.suppress(OSError):
             file.unlink(missing_ok=True)
-    shutil.rmtree(directory / _AGAIN, ignore_errors=True)
+    remove_folder(directory / _AGAIN)
 
 
 def _unused(selection: Selection, accepted: Baseline, told: set[str]) -> list[str]:
@@ -199,8 +199,8 @@ def _show(
         KeyboardInterrupt: it was ended.
     """
     again = run.directory / _AGAIN
-    if again.is_symlink():
-        again.unlink()
+    if again.is_symlink() or not again.is_dir():
+        again.unlink(missing_ok=True)
     try:
         chosen = [scenario for scenario in scenarios if scenario.name in failing]
         if not chosen:
@@ -214,4 +214,4 @@ def _show(
                 with contextlib.suppress(OSError):  # a folder that cannot be written has been told of
                     file.replace(run.directory / name / file.name)
     finally:
-        shutil.rmtree(again, ignore_errors=True)
+        remove_folder(again)

@@ -12,6 +12,9 @@ from replay.batch.case_folder import LOG, is_there, said
 from replay.batch.judged import OVERLAY, Judged
 from replay.batch.written import RESULT
 from replay.comparison import report_html
+from replay.comparison.measured import report_html as report_html_measured
+from replay.comparison.measured.report_text import summary
+from replay.comparison.measured.result import MeasuredComparison
 from replay.comparison.plots import Plot
 from replay.comparison.runs import Case
 from replay.errors import count
@@ -23,7 +26,14 @@ _LINES = 30
 
 
 def case_page(
-    item: Judged, case: Case | None, drawn: Sequence[Plot], *, folder: Path, again: str, undrawn: bool
+    item: Judged,
+    case: Case | None,
+    drawn: Sequence[Plot],
+    machine: MeasuredComparison | None = None,
+    *,
+    folder: Path,
+    again: str,
+    undrawn: bool,
 ) -> str:
     """Return a scenario's page, which needs no other file, no network and no script.
 
@@ -31,6 +41,7 @@ def case_page(
         item: the scenario.
         case: its comparison; None without one.
         drawn: drawings of its signals.
+        machine: its comparison with the machine; None without one.
         folder: of the scenario.
         again: the command that runs and compares it again.
         undrawn: there are more drawings, for which the night has no room.
@@ -47,6 +58,9 @@ def case_page(
         count=count,
         style=report_html.style(),
         details=report_html.details,
+        machine=machine,
+        summary=summary,
+        beside=report_html_measured.details,
     )
     return page
 

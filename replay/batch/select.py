@@ -14,6 +14,7 @@ from replay.batch.case import CaseResult, CaseStatus
 from replay.batch.folders import look_through
 from replay.batch.shard import Shard
 from replay.errors import InvalidValue, Problem, ScenarioError
+from replay.language.fields import stands_beside
 from replay.language.globs import fits
 from replay.lfs_pointer import is_lfs_pointer
 from replay.scenario.load import load_cases, load_sources
@@ -206,7 +207,7 @@ def _name_in(path: Path, taken: Collection[str]) -> str:
     stem = path.stem.lstrip(".") or "scenario"  # the name of a folder, and no way to another one
     numbered = (f"{stem}_{number}" for number in itertools.count(2))
     names = itertools.chain([found[1].decode()] if found else [], [stem], numbered)
-    return next(name for name in names if name not in taken)
+    return next(name for name in names if name not in taken and not stands_beside(name))
 
 
 def _any_matches(name: str, patterns: Sequence[str]) -> bool:

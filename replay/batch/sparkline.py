@@ -15,9 +15,13 @@ def sparkline(values: Sequence[float | None]) -> str:
     known = [value for value in values if value is not None]
     if not known:
         return ""
-    low, high = min(known), max(known)
+    low, high = 0.5 * min(known), 0.5 * max(known)  # halves: the difference of two numbers may be none
     flat = high - low <= 1e-6 * max(abs(low), abs(high))
     return "".join(
-        "·" if value is None else _BARS[3] if flat else _BARS[round((value - low) / (high - low) * (len(_BARS) - 1))]
+        "·"
+        if value is None
+        else _BARS[3]
+        if flat
+        else _BARS[round((0.5 * value - low) / (high - low) * (len(_BARS) - 1))]
         for value in values
     )

@@ -149,7 +149,7 @@ class _Drawing:
 
 def _drawing(trend: Trend, curve: NightCurve) -> _Drawing:
     low, high = min(curve.known), max(curve.known)
-    span = high - low or max(abs(high), 1.0)
+    span = 0.5 * high - 0.5 * low or max(abs(high), 1.0)  # halves: the difference of two numbers may be none
     middle = 0.0 if high > low else 0.5
     step = _WIDTH / max(len(trend.times) - 1, 1)
     points, line, pen = [], [], "M"
@@ -157,7 +157,7 @@ def _drawing(trend: Trend, curve: NightCurve) -> _Drawing:
         if value is None:
             pen = "M"
             continue
-        x, y = k * step, _HEIGHT * (1.0 - (value - low) / span - middle)
+        x, y = k * step, _HEIGHT * (1.0 - (0.5 * value - 0.5 * low) / span - middle)
         line.append(f"{pen}{x:.1f} {y:.1f}")
         points.append(
             (

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from replay.batch.memory import Peak, PeakMeter
+from replay.batch.raised import told
 
 Follow = Callable[[int, int], None]
 """Called with what is done of a task and all of it."""
@@ -145,7 +146,7 @@ def main() -> None:
                 message: object = Finished(value, meter.read())
             except Exception as error:
                 traceback.print_exc()
-                message = Raised(f"{type(error).__name__}: {error}", meter.read())
+                message = Raised(told(error), meter.read())
         answer(message)
 
 

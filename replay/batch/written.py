@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 from typing_extensions import TypedDict
 
 from replay.json_text import read_json, read_json_file, typed
@@ -29,12 +29,12 @@ class WrittenMeasure(TypedDict):
 
     scenario: str
     name: str
-    value: float | None
+    value: FiniteFloat | None
     unit: str
-    time: float | None
+    time: FiniteFloat | None
     subject: str
-    limit: float | None
-    margin: float | None
+    limit: FiniteFloat | None
+    margin: FiniteFloat | None
 
 
 class WrittenResult(TypedDict):
@@ -62,7 +62,7 @@ class WrittenNight(TypedDict):
     failing: list[str]
     accepted: NotRequired[str]
     units: NotRequired[dict[str, str]]
-    results: NotRequired[dict[str, dict[str, float]]]
+    results: NotRequired[dict[str, dict[str, FiniteFloat]]]
 
 
 def read_result(path: Path) -> WrittenResult:

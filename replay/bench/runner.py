@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from replay.collision.columns import Level
+from replay.collision.engines import NarrowPhase
 from replay.collision.pair_frames import PairFrames
-from replay.collision.pipeline import NarrowPhase
 from replay.kinematics.linkage import LinkPoses
 from replay.kinematics.motion import sample
 from replay.numerics.arrays import Flags, Floats, Integers

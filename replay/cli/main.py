@@ -30,6 +30,7 @@ COMMANDS = {
     "experiments": "reproduce the thesis's experiments with the capacitive sensor",
     "export": "write a recording's topics as csv, json or parquet",
     "diff": "say what differs between two recordings or two run folders",
+    "compare": "put a recording beside a log of the real machine",
     "explain": "say why a reading is what it is at a moment",
     "regress": "run scenarios and compare each with its baseline",
     "merge": "put the run folders of several shards into one night",

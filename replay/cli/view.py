@@ -17,7 +17,7 @@ from replay.cli.values import CameraAt, PathName, Size
 @click.argument("recordings", nargs=-1, required=True, type=PathName())
 @click.option("--screenshot", type=PathName(), metavar="PNG", help="Write a picture; needs no display.")
 @click.option("--at", type=float, metavar="SECONDS", help="Moment of the picture; the end when left out.")
-@click.option("--size", type=Size(), default="1280x800", show_default=True, help="Of the picture's window [points].")
+@click.option("--size", type=Size(), default="1280x800", show_default=True, help="Of the viewer's window [pixels].")
 @click.option("--camera", type=CameraAt(), help="From where to look, and to where: X,Y,Z or X,Y,Z,TX,TY,TZ [m].")
 @click.option("--scene-only", is_flag=True, help="A picture of the scene alone.")
 @click.option("--web", is_flag=True, help="Serve the viewer to this machine's browsers, on 127.0.0.1 only.")

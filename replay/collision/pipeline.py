@@ -11,73 +11,27 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
-from replay.collision import (
-    broad,
-    candidates,
-    crossing_search,
-    interval_proof,
-    narrow,
-    relative,
-    scan,
-    support,
-    traversal,
-    way_sieve,
-    ways,
-)
-from replay.collision.bodies import Bodies, Bounds, Pieces, collect, fit_volumes
+from replay.collision import interval_proof, narrow
+from replay.collision.batches import Batch, FrameDecider, batches
+from replay.collision.bodies import Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
 from replay.collision.columns import MARGIN, Between, CollisionColumns, CollisionEntries, Crossings
 from replay.collision.counters import Counters
+from replay.collision.engines import Engine, NarrowPhase, engine_of
 from replay.collision.intervals import Course, Intervals, Known
-from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.pairs import CollisionBody, Pair, PairRules
-from replay.collision.relative import RelativePoses
 from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
-from replay.geometry import box_search, calipers, decomposition, principal_axes, smallest_ball, tree
-from replay.kinematics import travel
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
-from replay.numerics.jit import entries_of
-
-LINK_PAIRS_AT_ONCE = 512
-"""Relative poses held at a time: 512 link pairs of 256 frames are 16 MiB."""
-
-PAIRS_AT_ONCE = 16_384
-"""Pairs worked off at a time: of 256 frames, 50 MiB."""
 
 FEW_PAIRS = 512
 """Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
-
-
-def kernels(
-    *, bounds: Bounds, narrowphase: str, pieces: Pieces, savings: bool = True, between: str = "sampled"
-) -> tuple[Any, ...]:
-    """Return the kernels that a pipeline with these options calls; see `CollisionPipeline`.
-
-    Args:
-        bounds, narrowphase, pieces, savings: its options.
-        between: "proven" if it has a motion, else "sampled".
-    """
-    used = [tree, support, relative, candidates]
-    used += {"sphere": [smallest_ball], "aabb": []}.get(bounds, [principal_axes, box_search, calipers])
-    used += [decomposition] if pieces == "convex" else []
-    used += [traversal] if narrowphase == "fcl" else [narrow if savings else scan]
-    if between == "proven":
-        used += [travel, ways, way_sieve, interval_proof, crossing_search, *([narrow] if narrowphase == "fcl" else [])]
-    return (*entries_of(*used), broad.sieve if savings else broad.keep_all)
-
-
-class NarrowPhase(Protocol):
-    """What decides the pair-frames that the broad phase leaves; see `narrow.decide` for the arguments."""
-
-    def __call__(self, frames: PairFrames, limit: float, counts: Integers) -> None:
-        """Finish level, clearance and undecided where the task asks for it."""
 
 
 class CollisionPipeline:
@@ -113,7 +67,7 @@ class CollisionPipeline:
         linkage: Linkage,
         *,
         bounds: Bounds = "obb",
-        narrowphase: Literal["gjk", "fcl"] = "gjk",
+        narrowphase: Engine = "gjk",
         pieces: Pieces = "exact",
         clearance: Literal["never", "near", "always"] = "near",
         margin: float = MARGIN,
@@ -145,27 +99,35 @@ class CollisionPipeline:
         self._place = np.full(len(bodies), -1, dtype=np.int64)
         self._place[self._used] = np.arange(len(chosen))
         self._static: list[_Found] | None = None
+        # between frames distances are our own, whatever decides at the frames
+        self._own: NarrowPhase | None = None
+        self._cap = math.inf if clearance == "always" else float(margin)
+        self._intervals: Intervals | None = None
         if chosen:
             arrays = collect(chosen, pieces=pieces)
             self._volumes = fit_volumes(chosen, arrays, bounds=bounds, pieces=pieces)
-            self._bodies = arrays
-            self.narrow_phase = _engine(narrowphase, chosen, arrays, savings)
-        # between frames distances are our own, whatever decides at the frames
-        self._own: NarrowPhase | None = None
-        if chosen and motion is not None and narrowphase == "fcl":
-            self._own = partial(narrow.decide, arrays)
-        self._cap = math.inf if clearance == "always" else float(margin)
-        self._intervals: Intervals | None = None
-        if chosen and motion is not None:
-            self._intervals = Intervals(
-                linkage,
-                motion,
+            self.narrow_phase = engine_of(narrowphase, chosen, arrays, savings=savings)
+            if motion is not None:
+                if narrowphase == "fcl":
+                    self._own = partial(narrow.decide, arrays)
+                self._intervals = Intervals(
+                    linkage,
+                    motion,
+                    arrays,
+                    self._volumes,
+                    self._links,
+                    limit=self._limit,
+                    cap=self._cap,
+                    savings=savings,
+                    counters=self.counters,
+                )
+            self._frames = FrameDecider(
                 arrays,
                 self._volumes,
-                self._links,
-                limit=self._limit,
-                cap=self._cap,
+                self._limit,
                 savings=savings,
+                turning=self._uses_world,
+                by_ways=not self._uses_world and self._own is None,
                 counters=self.counters,
             )
         self._all: Selected | None = None  # what every block looks at, where that is all pairs
@@ -296,11 +258,11 @@ class CollisionPipeline:
             reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _work(self, batch: _Batch, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
+    def _work(self, batch: Batch, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
         """Yield what is found of a batch's pairs in a block."""
         rows, columns, ways, n = batch.rows, batch.columns, batch.ways, len(poses.local)
         if course is None or self._intervals is None:
-            frames = self._decided(self.narrow_phase, batch, rows, poses)
+            frames = self._frames.decide(self.narrow_phase, batch, rows, poses)
             yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, None)
             return
         middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
@@ -314,13 +276,13 @@ class CollisionPipeline:
             yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(ways[quiet], course))
             columns, rows, ways = columns[near], rows[near], ways[near]
         shown, first = poses.slice(lead, n), poses.slice(0, 1)
-        frames = self._decided(self.narrow_phase, batch, rows, shown, ways, course)
-        head = self._decided(self.narrow_phase, batch, rows, first) if lead else None
+        frames = self._frames.decide(self.narrow_phase, batch, rows, shown, ways, course)
+        head = self._frames.decide(self.narrow_phase, batch, rows, first) if lead else None
         told, before = frames, head
         if self._own is not None:
-            told = frames._replace(clearance=self._decided(self._own, batch, rows, shown).clearance)
+            told = frames._replace(clearance=self._frames.decide(self._own, batch, rows, shown).clearance)
             if head is not None:
-                before = head._replace(clearance=self._decided(self._own, batch, rows, first).clearance)
+                before = head._replace(clearance=self._frames.decide(self._own, batch, rows, first).clearance)
         known = self._intervals.answer(told, before, ways, course)
         if not self._savings:  # as it is told where these are not looked at
             known.bound[(known.between == Between.CLEAR) & (kinds == interval_proof.FAR)] = self._cap
@@ -338,90 +300,11 @@ class CollisionPipeline:
             Known(np.full(shape, Between.CLEAR, dtype=np.uint8), bound, Crossings.none()),
         )
 
-    def _decided(
-        self,
-        engine: NarrowPhase,
-        batch: _Batch,
-        rows: Integers,
-        poses: LinkPoses,
-        ways: Integers | None = None,
-        course: Course | None = None,
-    ) -> PairFrames:
-        """Return what an engine finds of some of a batch's pairs in frames; by their ways if the course is known."""
-        wanted = np.zeros(batch.relative.count, dtype=bool)
-        wanted[rows[:, 2]] = True
-        relative = batch.relative.of(poses.local, wanted)
-        turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
-        if self._uses_world:
-            turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
-        frames = unanswered(rows, relative, turns)
-        sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
-        spreads, scratch = np.empty((len(relative), 2)), np.zeros((8, 4))
-        limit = self._limit
-        if self._savings and ways is not None and course is not None and not self._uses_world and self._own is None:
-            way_sieve.sieve_by_way(
-                self._bodies,
-                self._volumes,
-                frames,
-                course.begin,
-                ways,
-                course.ways,
-                course.rounding,
-                limit,
-                sieved,
-                scratch,
-                np.empty((3, 3)),
-                np.empty(3),
-            )
-        elif self._savings:
-            broad.sieve(self._volumes, frames, limit, sieved, spreads, scratch)
-        else:
-            broad.keep_all(self._volumes, frames, scratch)
-            limit = math.inf if limit > 0.0 else 0.0
-        engine(frames, limit, decided)
-        if not self._savings:
-            frames.clearance[frames.clearance > self._limit] = np.nan
-        self.counters.add(sieved.tolist(), decided.tolist())
-        return frames
-
-    def _batches(self, chosen: Selected) -> list[_Batch]:
-        """Return pairs in batches that share link pairs."""
+    def _batches(self, chosen: Selected) -> list[Batch]:
         rows = self._place[chosen.rows]
-        links = self._links[rows]
-        order = np.lexsort((links[:, 1], links[:, 0]))
-        rows, links, columns = rows[order], links[order], chosen.columns[order]
-        starts = np.ones(len(rows), dtype=bool)
-        starts[1:] = (links[1:] != links[:-1]).any(axis=1)
-        number = np.cumsum(starts) - 1  # of each pair's link pair
-        batches, begin = [], 0
-        while begin < len(rows):
-            end = int(np.searchsorted(number, number[begin] + LINK_PAIRS_AT_ONCE))
-            end = min(end, begin + PAIRS_AT_ONCE)
-            part = slice(begin, end)
-            _, first, q = np.unique(number[part], return_index=True, return_inverse=True)
-            bases, base = np.unique(links[part, 0], return_inverse=True)
-            table = np.stack([rows[part, 0], rows[part, 1], q, base if self._uses_world else 0 * base], axis=1)
-            places = RelativePoses(self._linkage, links[part][first])
-            rise = np.zeros((0, 4), dtype=np.int64)
-            if self._intervals is not None:
-                rise = self._intervals.rows(rows[part])
-            batches.append(_Batch(columns[part], table, places, bases, rise))
-            begin = end
-        return batches
-
-
-@dataclass(frozen=True, eq=False)
-class _Batch:
-    """Pairs evaluated together: `rows` for `broad.sieve`, their relative poses, the links of their first bodies.
-
-    `ways` are the rows of `intervals.Course.ways`, none if nothing is asked of intervals.
-    """
-
-    columns: Integers
-    rows: Integers
-    relative: RelativePoses
-    bases: Integers
-    ways: Integers
+        return batches(
+            rows, chosen.columns, self._links, self._linkage, turning=self._uses_world, intervals=self._intervals
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -434,12 +317,3 @@ class _Found:
     clearance: Floats
     undecided: Flags
     known: Known | None
-
-
-def _engine(name: str, bodies: Sequence[CollisionBody], arrays: Bodies, savings: bool) -> NarrowPhase:
-    if name == "fcl":
-        from replay.collision.fcl_engine import FclEngine
-
-        return FclEngine(bodies, arrays)
-
-    return partial(narrow.decide if savings else scan.decide_without_savings, arrays)

@@ -12,7 +12,7 @@ import numpy as np
 from replay.comparison import difference as result
 from replay.comparison.events import Matched, StateTrack, match, tracks
 from replay.comparison.moments import Moments
-from replay.comparison.numbers import Errors, compare_numbers, compare_rotations
+from replay.comparison.numbers import Errors, compare_numbers, compare_rotations, root_mean_square
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.signals import Group, Signal, unify_categories
 from replay.numerics.arrays import Column, Flags, Floats, Integers
@@ -96,7 +96,7 @@ def compare_groups(
             found = _compare_states(of, a.field, x, y, categories, frames, tolerance, echo)
         else:
             compare = compare_rotations if a.field.kind is Kind.ROTATION else compare_numbers
-            found = _summarise(compare(x, y, tolerance), x, y, frames, echo, a.field.kind)
+            found = _summarise(compare(x, y, tolerance), x, y, frames, echo, a.field.kind, tolerance.rms)
         if found is not None:
             item = found(signal, rule)
             yield dataclasses.replace(item, decides=False) if tolerance.ignore else item
@@ -144,9 +144,16 @@ def _echo(gates: Mapping[tuple[str, str, str], Flags], signal: Signal, field: Fi
 
 
 def _summarise(
-    errors: Errors, x: Column, y: Column, frames: MatchedFrames, echo: Flags | None, kind: Kind
+    errors: Errors,
+    x: Column,
+    y: Column,
+    frames: MatchedFrames,
+    echo: Flags | None,
+    kind: Kind,
+    bound: float | None,
 ) -> Finding | None:
     differs, outside = errors.differs | errors.outside, errors.outside
+    rms = None if bound is None else root_mean_square(errors.error if echo is None else errors.error[~echo])
     echoes = 0
     if echo is not None:
         echoes = int((differs & echo).sum())
@@ -165,7 +172,8 @@ def _summarise(
 
     return partial(
         result.SignalDifference,
-        decides=bool(outside.any()),
+        decides=bool(outside.any()) or (bound is not None and rms is not None and rms > bound),
+        rms=rms,
         frames=int(differs.sum()),
         outside=int(outside.sum()),
         first=frames.baseline_moment(int(np.argmax(decisive))),

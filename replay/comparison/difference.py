@@ -89,6 +89,7 @@ class SignalDifference:
         outside: of these, frames outside the tolerance; for states, events that are not accepted.
         first: the first frame outside the tolerance, or that differs when none is outside.
         worst_abs, worst_rel: over all frames that differ by a finite number.
+        rms: root mean square of the differences in all frames; None where the rule does not bound it.
         least: the smallest number of each run over all common frames; None where one has none, and for states.
         nan: frames in which NaN is not accepted: in one run only, or in any under `nan: fail`.
         infinite: frames with an infinity in one run only, or two of opposite sign.
@@ -114,6 +115,13 @@ class SignalDifference:
     lone_events: int = 0
     max_shift: float = 0.0
     max_shift_frames: int = 0
+    rms: float | None = None
+
+    @property
+    def spread(self) -> bool:
+        """Whether the root mean square of the differences is larger than the rule accepts."""
+        bound = None if self.rule is None else self.rule.tolerance.rms
+        return bound is not None and self.rms is not None and self.rms > bound
 
 
 @dataclass(frozen=True)

@@ -147,6 +147,8 @@ def _moment(item: SignalDifference) -> float:
 def size(item: SignalDifference) -> float:
     """Return how large a difference is in tolerances; where there is none, in 1e-9 of the value."""
     tolerance = EXACT if item.rule is None else item.rule.tolerance
+    if item.spread and item.rms is not None and tolerance.rms is not None and not item.outside:
+        return item.rms / max(tolerance.rms, 1e-300)
     if item.event_count:
         if item.lone_events:
             return 1e6 * max(item.frames, 1)

@@ -12,7 +12,7 @@ import numpy as np
 from replay.collision.closest_triangles import closest_triangles
 from replay.collision.columns import Between, Level
 from replay.comparison import quantities
-from replay.errors import InvalidValue, ReplayError, count
+from replay.errors import InvalidValue, RecordingError, ReplayError, count
 from replay.kinematics.linkage import LinkPoses
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
@@ -20,6 +20,7 @@ from replay.numerics.columns import Field
 from replay.numerics.constants import SECOND
 from replay.recording.reader import Recording, read
 from replay.recording.slim import attached_files
+from replay.scenario.layout import Layout
 from replay.scenario.load import load_sources
 from replay.scenario.methods import METHOD_REVISIONS, Model
 from replay.scenario.scene import Scene, build
@@ -71,11 +72,22 @@ def explain(path: Path, signal: str, at: float, *, slow: bool = False) -> list[s
         raise InvalidValue("--at", f"{at:g} s", f"is no moment of the recording, which ends at {end:.6g} s")
     scenario_name, root, files = attached_files(path)
     scene = build(load_sources(root, files, case=scenario_name))
+    _check(path, recording.layout, scene.layout)
     row = int(np.searchsorted(recording.time, round(at * SECOND), side="right")) - 1
     moment = _Moment(recording, scene, row, _poses(scene, recording, row))
     lines = [f"{signal} at frame {row} ({recording.time[row] / SECOND:.9g} s)"]
     lines += _pair(moment, name) if kind == "" else _sensor(moment, kind, name, slow)
     return lines
+
+
+def _check(path: Path, recorded: Layout, built: Layout) -> None:
+    """Raise RecordingError unless the attached scenario has the names behind the recording's columns."""
+    sensors = {(kind, name) for kind, names in recorded.sensors.items() for name in names}
+    there = {(kind, name) for kind, names in built.sensors.items() for name in names}
+    moved = (recorded.links, recorded.joints) != (built.links, built.joints)
+    if moved or not sensors <= there or not {*recorded.pairs} <= {*built.pairs}:
+        rule = "holds another scenario than it was made of: its links, joints, pairs or sensors have other names"
+        raise RecordingError(str(path), rule)
 
 
 def _asked(recording: Recording, signal: str) -> tuple[str, str]:

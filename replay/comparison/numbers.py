@@ -37,7 +37,7 @@ def compare_numbers(a: Column, b: Column, tolerance: Tolerance) -> Errors:
         error = np.abs(a - b)
         scale = np.maximum(np.abs(a), np.abs(b))
         relative = error / scale
-        near = error <= np.maximum(tolerance.abs, tolerance.rel * scale)
+        near = (error <= np.maximum(tolerance.abs, tolerance.rel * scale)) | (not tolerance.of_frames)
     equal = a == b
     finite = np.isfinite(a) & np.isfinite(b)
     inside = equal | (near & finite)
@@ -61,6 +61,13 @@ def compare_numbers(a: Column, b: Column, tolerance: Tolerance) -> Errors:
     )
 
 
+def root_mean_square(error: Floats) -> float:
+    """Return the root mean square of the errors that are numbers; 0 for none. Squares neither overflow nor vanish."""
+    known = error[np.isfinite(error)]
+    largest = float(known.max(initial=0.0))
+    return largest * float(np.sqrt(np.mean((known / largest) ** 2))) if largest > 0.0 else 0.0
+
+
 def compare_rotations(a: Column, b: Column, tolerance: Tolerance) -> Errors:
     """Compare two columns (F, 4) of unit quaternions xyzw by the angle between them [rad].
 
@@ -73,7 +80,9 @@ def compare_rotations(a: Column, b: Column, tolerance: Tolerance) -> Errors:
         equal = (a == b).all(axis=1) | (a == -b).all(axis=1)
         vector = a[:, 3:] * b[:, :3] - b[:, 3:] * a[:, :3] - np.cross(a[:, :3], b[:, :3])
         angle = 2.0 * np.arctan2(np.sqrt((vector * vector).sum(axis=1)), np.abs((a * b).sum(axis=1)))
-        inside = equal | ((angle <= tolerance.abs) & (tolerance.abs > 0))
+        inside = (
+            equal | ((angle <= tolerance.abs) & (tolerance.abs > 0)) | ((not tolerance.of_frames) & np.isfinite(angle))
+        )
     nan_a, nan_b = np.isnan(a).any(axis=1), np.isnan(b).any(axis=1)
     if tolerance.nan == "equal":
         both = nan_a & nan_b

@@ -51,14 +51,14 @@ class _Mark:
 
 
 @dataclass(frozen=True, eq=False)
-class _Side:
+class Side:
     """One run: its bodies, and a recording that has its poses."""
 
     scene: SceneView
     poses: Recording
 
     @staticmethod
-    def of(recording: Recording) -> _Side:
+    def of(recording: Recording) -> Side:
         """Read what a pair leaves out: the scene, and poses that are equal in both."""
         poses = recording if recording.layout.links else read(recording.path, topics=["/tf"])
         index = {name: k for k, name in enumerate(poses.layout.links)}
@@ -70,7 +70,7 @@ class _Side:
                 triangles = points[np.array(mesh.indices, dtype=np.int64).reshape(-1, 3)]
                 bodies.append(BodyView(entity.id, index[entity.frame_id], triangles, (0, 0, 0, 0)))
         name = recording.provenance.scenario
-        return _Side(SceneView(name, description="", links=poses.layout.links, bodies=tuple(bodies)), poses)
+        return Side(SceneView(name, description="", links=poses.layout.links, bodies=tuple(bodies)), poses)
 
     def extent(self) -> Floats:
         """Return points (n, 3) [m] in world coordinates that span the scene and where it moves."""
@@ -94,7 +94,7 @@ def write_overlay(path: str | Path, case: Case, pair: RecordingPair, *, overwrit
 
     file = RerunFile(path, overwrite=overwrite)
     try:
-        sides = {BASELINE: _Side.of(pair.baseline), CANDIDATE: _Side.of(pair.candidate)}
+        sides = {BASELINE: Side.of(pair.baseline), CANDIDATE: Side.of(pair.candidate)}
         eye = eye_of(np.concatenate([side.extent() for side in sides.values()]))
         marks = sorted(_marks(case), key=lambda mark: mark.at.time)
         shown = case.difference.signals[:CURVES]
@@ -106,8 +106,8 @@ def write_overlay(path: str | Path, case: Case, pair: RecordingPair, *, overwrit
         stream.log("summary", rr.TextDocument(summary), static=True)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for name, side in sides.items():
-            _log_scene(stream, name, side.scene)
-            _log_poses(stream, name, side.poses)
+            log_scene(stream, name, side.scene, COLORS[name])
+            log_poses(stream, name, side.poses)
         curves = Curves(pair)
         for item in shown:
             _log_curve(stream, item, curves.curve(item), pair.baseline)
@@ -118,7 +118,8 @@ def write_overlay(path: str | Path, case: Case, pair: RecordingPair, *, overwrit
         raise
 
 
-def _log_scene(stream: Any, side: str, scene: SceneView) -> None:
+def log_scene(stream: Any, side: str, scene: SceneView, color: Color) -> None:
+    """Log the bodies of one side, in one colour."""
     import rerun as rr
 
     corners, normals = (part.reshape(-1, 3) for part in (scene.meshes.triangles, corner_normals(scene.meshes)))
@@ -126,11 +127,12 @@ def _log_scene(stream: Any, side: str, scene: SceneView) -> None:
     for body, begin, end in zip(scene.bodies, ends, ends[1:], strict=False):
         path = [side, SCENE, scene.links[body.link], body.name.rpartition("/")[2]]
         positions, across = corners[begin:end], normals[begin:end]
-        shape = rr.Mesh3D(vertex_positions=positions, vertex_normals=across, albedo_factor=COLORS[side])
+        shape = rr.Mesh3D(vertex_positions=positions, vertex_normals=across, albedo_factor=color)
         stream.log(path, shape, static=True)
 
 
-def _log_poses(stream: Any, side: str, recording: Recording) -> None:
+def log_poses(stream: Any, side: str, recording: Recording) -> None:
+    """Log the poses of the links of one side, where they change."""
     import rerun as rr
 
     for link, name in enumerate(recording.layout.links):
@@ -140,7 +142,7 @@ def _log_poses(stream: Any, side: str, recording: Recording) -> None:
         columns = rr.Transform3D.columns(
             translation=poses[rows][:, :3, 3], quaternion=recording.link_quaternions[rows, link]
         )
-        _send(stream, [side, "scene", name], recording.time[rows], np.flatnonzero(rows), columns)
+        send(stream, [side, "scene", name], recording.time[rows], np.flatnonzero(rows), columns)
 
 
 def _log_curve(stream: Any, item: SignalDifference, curve: ComparedCurve, baseline: Recording) -> None:
@@ -160,7 +162,7 @@ def _log_curve(stream: Any, item: SignalDifference, curve: ComparedCurve, baseli
         title = f"{side}: {short}" if side != DIFFERENCE else short
         lines = rr.SeriesLines(names=title, colors=color, widths=3.0 if side == BASELINE else 1.5)
         stream.log(path, lines, static=True)
-        _send(stream, path, time, frames, rr.Scalars.columns(scalars=column))
+        send(stream, path, time, frames, rr.Scalars.columns(scalars=column))
 
 
 def _log_marks(stream: Any, marks: list[_Mark]) -> None:
@@ -172,10 +174,11 @@ def _log_marks(stream: Any, marks: list[_Mark]) -> None:
     texts = [mark.text for mark in marks]
     texts[0] = f"first difference: {texts[0]}"
     columns = rr.TextLog.columns(text=texts, level=[mark.level for mark in marks])
-    _send(stream, [DIFFERENCE, "moments"], time, np.array([mark.at.frame for mark in marks]), columns)
+    send(stream, [DIFFERENCE, "moments"], time, np.array([mark.at.frame for mark in marks]), columns)
 
 
-def _send(stream: Any, path: list[str], time: Integers, frames: NDArray[Any], *columns: Any) -> None:
+def send(stream: Any, path: list[str], time: Integers, frames: NDArray[Any], *columns: Any) -> None:
+    """Send columns of an entity at times (n,) [ns] and frames (n,)."""
     import rerun as rr
 
     index = [

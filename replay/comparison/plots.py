@@ -15,7 +15,7 @@ from replay.comparison.effects import effects
 from replay.comparison.numbers import compare_numbers, compare_rotations
 from replay.comparison.rules import EXACT, Rules
 from replay.comparison.runs import RecordingPair
-from replay.comparison.signals import groups, unify_categories
+from replay.comparison.signals import Signal, groups, unify_categories
 from replay.numerics.arrays import Column, Flags, Floats, Integers
 from replay.numerics.columns import Kind
 from replay.numerics.constants import SECOND
@@ -143,13 +143,14 @@ def plots(found: Difference, pair: RecordingPair, limits: Mapping[str, float] | 
     main = {effect.signals[0]: k for k, effect in enumerate(effects(found)) if effect.signals}
     ordered = sorted(found.signals, key=lambda item: (not item.decides, main.get(item.signal.full_name, len(main))))
     known = {f"{_CLEARANCE}{name}": limit for name, limit in (limits or {}).items()}
-    return tuple(_plot(item, curves.curve(item), known.get(item.signal.full_name)) for item in ordered[:SHOWN])
+    return tuple(plot_of(item.signal, curves.curve(item), known.get(item.signal.full_name)) for item in ordered[:SHOWN])
 
 
 _CLEARANCE = "/collision/clearance/"
 
 
-def _plot(item: SignalDifference, curve: ComparedCurve, bound: float | None) -> Plot:
+def plot_of(signal: Signal, curve: ComparedCurve, bound: float | None = None) -> Plot:
+    """Return the drawing of a signal; `bound` is what is expected of its values."""
     begin, end = float(curve.seconds[0]), float(curve.seconds[-1])
     width = end - begin or 1.0
     x = (curve.seconds - begin) / width * WIDTH
@@ -167,8 +168,8 @@ def _plot(item: SignalDifference, curve: ComparedCurve, bound: float | None) -> 
         band = _band(x, upper(curve.baseline - curve.limit), upper(curve.baseline + curve.limit)) if has_limit else ""
         limit = _line(x, lower(curve.limit), False) if has_limit else ""
         return Plot(
-            signal=item.signal.full_name,
-            unit=item.signal.unit,
+            signal=signal.full_name,
+            unit=signal.unit,
             baseline=_line(x, upper(curve.baseline), curve.steps),
             candidate=_line(x, upper(curve.candidate), curve.steps),
             band=band,
@@ -183,7 +184,7 @@ def _plot(item: SignalDifference, curve: ComparedCurve, bound: float | None) -> 
             ticks=time_ticks(begin, end, WIDTH),
             levels=state_marks(curve.states, low, high, HEIGHT),
             bounds=() if bound is None else ((float(upper(np.array([bound]))[0]), "limit"),),
-            columns=columns(curve.seconds, x, curve.baseline, curve.candidate, item.signal.unit, curve.states),
+            columns=columns(curve.seconds, x, curve.baseline, curve.candidate, signal.unit, curve.states),
         )
 
 

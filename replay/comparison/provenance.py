@@ -10,6 +10,7 @@ from typing import Any
 
 from replay.comparison.difference import Change
 from replay.recording.provenance import Provenance
+from replay.scenario.measured_log import MEASURED
 
 FILES = "/files/"
 """Begins the name of an input file in changes and rules: `/files/meshes/head.stl`."""
@@ -27,7 +28,8 @@ def provenance_changes(baseline: Provenance, candidate: Provenance) -> tuple[Cha
 def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
     """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same.
 
-    A log of which a recording keeps an excerpt is the same if the excerpts are, or what they were cut out of.
+    A log of which a recording keeps an excerpt is the same if the excerpts are, or what they were cut out of. One that
+    the recording is only compared with changes no reading.
     """
     a, b = _originals(baseline), _originals(candidate)
     changes = _changes(_bodies(baseline), _bodies(candidate))
@@ -35,7 +37,9 @@ def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, .
 
 
 def _bodies(provenance: Provenance) -> dict[str, str]:
-    return {FILES + name: f"sha256 {digest}" for name, digest in provenance.files.items() if not _is_text(name)}
+    uses = {name: origin.get("use") for name, origin in provenance.originals.items()}
+    bodies = {name: digest for name, digest in provenance.files.items() if not _is_text(name)}
+    return {FILES + name: f"sha256 {digest}" for name, digest in bodies.items() if uses.get(name) != MEASURED}
 
 
 def _originals(provenance: Provenance) -> dict[str, str]:

@@ -56,11 +56,11 @@ def folded(found: Difference) -> list[tuple[SignalDifference, list[SignalDiffere
     return [(items[0], items[1:]) for items in told if items]
 
 
-def draw(plot: Plot) -> Any:
-    """Return a drawing as markup that is safe to put into a page."""
+def draw(plot: Plot, runs: tuple[str, str] = wording.RUNS) -> Any:
+    """Return a drawing as markup that is safe to put into a page; `runs` are what the two sides are called."""
     from markupsafe import Markup
 
-    text = _template("plot.svg.j2").render(plot=plot, width=WIDTH, height=HEIGHT, lower=LOWER)
+    text = _template("plot.svg.j2").render(plot=plot, runs=runs, width=WIDTH, height=HEIGHT, lower=LOWER)
     return Markup(text)  # rendered with autoescape
 
 

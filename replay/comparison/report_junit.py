@@ -28,18 +28,23 @@ def junit(found: RunDifference) -> bytes:
     root = ElementTree.Element("testsuites", {key: counts[key] for key in ("name", "tests", "failures", "errors")})
     suite = ElementTree.SubElement(root, "testsuite", counts)
     for case in found.cases:
-        element = _case(suite, case.name)
+        element = test_case(suite, case.name)
         if case.difference.verdict is DiffVerdict.DIFFERENT:
             message = wording.summary(case.difference)
-            _child(element, "failure", _details(found, case), message=message, type="different")
+            add(element, "failure", _details(found, case), message=message, type="different")
     for one in found.unreadable:
-        _child(_case(suite, one.name), "error", one.error, message=one.error, type="unreadable")
+        add(test_case(suite, one.name), "error", one.error, message=one.error, type="unreadable")
     for name, where in alone:
-        element = _case(suite, name)
+        element = test_case(suite, name)
         if name in found.ignored:
-            _child(element, "skipped", "", message=f"{where}; a rule accepts it")
+            add(element, "skipped", "", message=f"{where}; a rule accepts it")
         else:
-            _child(element, "failure", f"scenario {name}: {where}", message=where, type="missing")
+            add(element, "failure", f"scenario {name}: {where}", message=where, type="missing")
+    return written(root)
+
+
+def written(root: ElementTree.Element) -> bytes:
+    """Return a report as UTF-8 XML."""
     ElementTree.indent(root)
     xml: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return xml + b"\n"
@@ -49,12 +54,14 @@ def _details(found: RunDifference, case: Case) -> str:
     return text(RunDifference(found.baseline, found.candidate, (case,)))
 
 
-def _case(suite: ElementTree.Element, name: str) -> ElementTree.Element:
-    attributes = {"name": printable(name), "classname": SUITE, "time": "0"}
+def test_case(suite: ElementTree.Element, name: str, classname: str = SUITE) -> ElementTree.Element:
+    """Add a test case to a suite."""
+    attributes = {"name": printable(name), "classname": printable(classname), "time": "0"}
     return ElementTree.SubElement(suite, "testcase", attributes)
 
 
-def _child(element: ElementTree.Element, tag: str, content: str, **attributes: str) -> None:
+def add(element: ElementTree.Element, tag: str, content: str, **attributes: str) -> None:
+    """Add what became of a test case to it."""
     child = ElementTree.SubElement(element, tag, {key: clean(value) for key, value in attributes.items()})
     child.text = clean(content)
 

@@ -22,6 +22,8 @@ class Tolerance:
     Attributes:
         abs: largest difference, in the signal's unit.
         rel: largest difference relative to the larger value.
+        rms: largest root mean square of the differences over all frames, None for any; where neither `abs` nor `rel`
+            is given beside it, differences of single frames do not count.
         time, frames: largest shift of an event [s] and [frames]; the larger one counts.
         nan: whether NaN in both is equal, or any NaN a difference.
         zero: whether 0.0 and -0.0 are equal, or different.
@@ -37,6 +39,12 @@ class Tolerance:
     zero: Literal["equal", "signed"] = "equal"
     ignore: bool = False
     bracket: float | None = None
+    rms: float | None = None
+
+    @property
+    def of_frames(self) -> bool:
+        """Whether the differences of single frames count."""
+        return self.rms is None or self.abs > 0.0 or self.rel > 0.0
 
 
 EXACT = Tolerance()

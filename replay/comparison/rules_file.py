@@ -115,6 +115,8 @@ class RuleText(Part):
     """Largest difference of numbers, in the signal's SI unit."""
     rel: Bound = 0.0
     """Largest difference of numbers relative to the larger one; the larger of abs and rel counts."""
+    rms: Bound | None = None
+    """Largest root mean square of the differences over all frames; without abs and rel it alone counts."""
     time: Annotated[Shift, PlainValidator(_shift), WithJsonSchema(_SHIFT_SCHEMA)] = Shift()
     """Largest shift of an event: seconds, '20 ms', or '1 frame'."""
     bracket: Annotated[float, PlainValidator(_TIME.parse), WithJsonSchema(_TIME_SCHEMA)] | None = None
@@ -181,6 +183,7 @@ def _rule(text: RuleText, place: str) -> Rule:
     tolerance = Tolerance(
         abs=text.abs,
         rel=text.rel,
+        rms=text.rms,
         time=text.time.seconds,
         frames=text.time.frames,
         bracket=text.bracket,

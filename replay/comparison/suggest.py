@@ -82,6 +82,8 @@ def _tolerance(items: list[SignalDifference]) -> Iterator[str]:
     relative = [item.worst_rel.error for item in items if item.worst_rel is not None]
     instead = f"  # or rel: {round_up(max(relative))}" if relative and max(relative) > 0.0 else ""
     yield f"abs: {round_up(max(worst, _LEAST))}{instead}"
+    if present.rms is not None:
+        yield f"rms: {round_up(max([_LEAST, present.rms, *(item.rms for item in items if item.rms is not None)]))}"
     if present.nan != EXACT.nan:
         yield f"nan: {present.nan}"
     if present.zero != EXACT.zero:

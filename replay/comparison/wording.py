@@ -71,8 +71,12 @@ def absence(item: Absence, where: str) -> str:
     return text
 
 
-def event(item: EventDifference) -> str:
-    """Return one event in words."""
+RUNS = ("baseline", "candidate")
+"""What the two sides of a difference are called."""
+
+
+def event(item: EventDifference, runs: tuple[str, str] = RUNS) -> str:
+    """Return one event in words; `runs` are what the sides are called."""
     allowed = " [allowed]" if item.allowed else ""
     if item.fate is Fate.SHIFTED:
         assert item.baseline is not None and item.candidate is not None
@@ -84,17 +88,20 @@ def event(item: EventDifference) -> str:
         return f"{item.what} {much}: {moment(item.baseline)} -> {moment(item.candidate)}{allowed}"
     at = item.baseline if item.fate is Fate.VANISHED else item.candidate
     assert at is not None
-    where = "only in the baseline" if item.fate is Fate.VANISHED else "only in the candidate"
-    return f"{item.what} {where}: {moment(at)}{allowed}"
+    where = runs[0] if item.fate is Fate.VANISHED else runs[1]
+    return f"{item.what} only in the {where}: {moment(at)}{allowed}"
 
 
-def signal(item: SignalDifference, total: int, *, events: int | None = SHOWN_EVENTS) -> list[str]:
+def signal(
+    item: SignalDifference, total: int, *, events: int | None = SHOWN_EVENTS, runs: tuple[str, str] = RUNS
+) -> list[str]:
     """Return what a signal says, a line each: counts and first frame, then worst errors or events.
 
     Args:
         item: the signal.
         total: number of frames that were compared.
         events: how many events to tell; None for all that are kept.
+        runs: what the sides are called.
     """
     lines = []
     if item.event_count:
@@ -103,13 +110,16 @@ def signal(item: SignalDifference, total: int, *, events: int | None = SHOWN_EVE
         parts += [f"{count(item.lone_events, 'event')} in one run only"] if item.lone_events else []
         lines.append(f"{', '.join(parts)}; {item.frames} of {count(total, 'frame')} differ")
         shown = item.events[:events]
-        lines.extend(event(one) for one in shown)
+        lines.extend(event(one, runs) for one in shown)
         if len(shown) < item.event_count:
             lines.append(f"and {count(item.event_count - len(shown), 'more event')}")
     else:
         within = "" if item.outside == item.frames else f", {item.outside} outside the tolerance"
         lines.append(f"{item.frames} of {count(total, 'frame')} differ{within}; first {moment(item.first)}")
         lines.extend(_worst(item))
+        if item.rms is not None:
+            above = ", more than the rule accepts" if item.spread else ""
+            lines.append(f"root mean square {number(item.rms, item.signal.unit)}{above}")
         if item.nan:
             lines.append(f"{count(item.nan, 'frame')} with NaN in place of a number, or the reverse")
         if item.infinite:
@@ -151,6 +161,7 @@ def tolerance(item: Rule) -> str:
     default, given = EXACT, item.tolerance
     parts = ["ignored"] if given.ignore else []
     parts += [f"{key} {getattr(given, key):g}" for key in ("abs", "rel") if getattr(given, key)]
+    parts += [f"rms {given.rms:g}"] if given.rms is not None else []
     parts += [f"time {seconds(given.time)}"] if given.time else []
     parts += [f"time {count(given.frames, 'frame')}"] if given.frames else []
     parts += [f"bracket {seconds(given.bracket)}"] if given.bracket is not None else []

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import float64, int64
+from numba import float64
 
 from replay.geometry.calipers import turn_about
 from replay.numerics.arrays import Floats
@@ -36,6 +36,7 @@ def _nudge_axes() -> Floats:
 _NUDGES = _nudge_axes()
 
 
+@entry(float64[:, ::1], float64[:, ::1])
 @kernel
 def box_volume(points: Floats, axes: Floats) -> float:
     """Return the volume of the box along axes (3, 3 rows) around points (n, 3)."""
@@ -50,8 +51,6 @@ def box_volume(points: Floats, axes: Floats) -> float:
     return volume
 
 
-@entry(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1], int64, float64)
-@kernel
 def smallest_box(points: Floats, axes: Floats, trials: Floats, starts: Floats, kept: int, floor: float) -> Floats:
     """Return the axes (3, 3 rows) of the smallest box found around points; never a larger one than along `axes`.
 
@@ -66,42 +65,32 @@ def smallest_box(points: Floats, axes: Floats, trials: Floats, starts: Floats, k
     total = 1 + kept + len(starts)
     boxes, volumes = np.empty((total, 3, 3)), np.full(total, np.inf)
     result, trial, scratch = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    _copy(axes, result)
-    _copy(axes, boxes[0])
+    result[:] = boxes[0] = axes
     best = box_volume(points, axes)
     volumes[0] = best
     for k in range(len(trials)):
         volume = turn_about(points, trials[k], trial)
-        worst = 1
-        for j in range(2, kept + 1):
-            if volumes[j] > volumes[worst]:
-                worst = j
+        worst = 1 + int(np.argmax(volumes[1 : kept + 1]))
         if volume < volumes[worst]:
-            volumes[worst] = volume
-            _copy(trial, boxes[worst])
+            volumes[worst], boxes[worst] = volume, trial
     for k in range(len(starts)):
-        _copy(starts[k], boxes[1 + kept + k])
+        boxes[1 + kept + k] = starts[k]
         volumes[1 + kept + k] = box_volume(points, starts[k])
     for k in range(total):
         if volumes[k] < best * (1.0 - _GAIN):
-            best = volumes[k]
-            _copy(boxes[k], result)
+            best, result[:] = volumes[k], boxes[k]
     if best <= floor * (1.0 + 1e-6):
         return result
     for k in range(total):
         if volumes[k] < np.inf:
             volumes[k] = _turn(points, boxes[k], volumes[k], trial)
     for _ in range(_NUDGED):
-        least = 0
-        for k in range(total):
-            if volumes[k] < volumes[least]:
-                least = k
+        least = int(np.argmin(volumes))
         if volumes[least] < np.inf:
             volume = _nudge(points, boxes[least], volumes[least], trial, scratch)
             volume = _turn(points, boxes[least], volume, trial)
             if volume < best * (1.0 - _GAIN):
-                best = volume
-                _copy(boxes[least], result)
+                best, result[:] = volume, boxes[least]
             volumes[least] = np.inf
     return result
 
@@ -113,15 +102,13 @@ def _copy(source: Floats, target: Floats) -> None:
             target[i, j] = source[i, j]
 
 
-@kernel
 def _turn(points: Floats, axes: Floats, volume: float, trial: Floats) -> float:
     """Turn a box about its own axes in turn, in place, until none of the three makes it smaller; return its volume."""
     failed, i = 0, 0
     for _ in range(_MOST_TURNS):
         turned = turn_about(points, axes[i], trial)
         if turned < volume * (1.0 - _GAIN):
-            volume, failed = turned, 0
-            _copy(trial, axes)
+            volume, failed, axes[:] = turned, 0, trial
             i = 1  # the axis just used is now the first
         else:
             failed += 1
@@ -131,6 +118,7 @@ def _turn(points: Floats, axes: Floats, volume: float, trial: Floats) -> float:
     return volume
 
 
+@entry(float64[:, ::1], float64[:, ::1], float64, float64[:, ::1], float64[:, ::1])
 @kernel
 def _nudge(points: Floats, axes: Floats, volume: float, trial: Floats, best: Floats) -> float:
     """Turn a box, in place, by small angles about the 26 directions, the best first; return its volume."""

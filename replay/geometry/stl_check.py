@@ -34,13 +34,19 @@ def check(data: bytes) -> int:
 
 
 def is_binary(data: bytes) -> bool:
-    """Return whether a file is as long as a binary one with its header, which may begin with "solid" too."""
-    return len(data) == _HEADER + _FACET.itemsize * _announced(data)
+    """Return whether a file is as long as a binary one with its header, which may begin with "solid" too.
+
+    What follows the triangles is none where it is shorter than one, or zeros alone, as transfers in blocks leave them.
+    """
+    triangles = _announced(data)
+    end = _HEADER + _FACET.itemsize * triangles
+    more = len(data) - end
+    return more == 0 or (triangles > 0 and more > 0 and (more < _FACET.itemsize or not any(data[end:])))
 
 
 def triangles(data: bytes) -> tuple[Floats, Integers]:
     """Return the vertices (3 n, 3) and triangles (n, 3) of a binary file, corner by corner."""
-    corners = np.frombuffer(data, dtype=_FACET, offset=_HEADER)["corners"]
+    corners = np.frombuffer(data, dtype=_FACET, offset=_HEADER, count=_announced(data))["corners"]
     with np.errstate(invalid="ignore"):  # NaN that signals
         return corners.reshape(-1, 3).astype(np.float64), np.arange(3 * len(corners)).reshape(-1, 3)
 

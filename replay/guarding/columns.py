@@ -6,8 +6,6 @@ import enum
 from dataclasses import dataclass, field
 from typing import Annotated
 
-import numpy as np
-
 from replay.numerics.arrays import Bytes, Flags, Floats
 from replay.numerics.columns import Columns, Field, Kind
 
@@ -63,9 +61,3 @@ class GuardColumns(Columns):
     rate: Annotated[Floats, Field(each="joints", chart="Clocks of the joints' scripts")]
     script_time: Annotated[Floats, Field(each="joints", unit="s")]
     happenings: tuple[Happening, ...] = field(default=())
-
-
-def no_guards(frames: int) -> GuardColumns:
-    """Return the columns of no guards and no joints."""
-    none = np.zeros((frames, 0))
-    return GuardColumns(none.astype(np.uint8), none.astype(np.bool_), none, none, none)

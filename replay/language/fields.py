@@ -56,8 +56,14 @@ MAX_TITLE_BYTES = 200  # file systems take names of 255 bytes, and ".mcap.part" 
 
 
 _DEVICES = ("CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10)))
+_OWN_FILES = ["run.json", "index.html", "junit.xml", "summary.md", "metrics.parquet", "history.jsonl", "accepted.jsonl"]
 _INVISIBLE = re.compile("[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]")
 """Marks that turn the direction of writing, break the line or show nothing: two names would look the same."""
+
+
+def stands_beside(name: str) -> bool:
+    """Return whether a name is that of a file which stands beside scenarios' folders, in a run or baseline folder."""
+    return name.casefold() in _OWN_FILES
 
 
 def _fits_file_systems(title: str) -> str:
@@ -66,6 +72,8 @@ def _fits_file_systems(title: str) -> str:
         raise rejected(f"takes {size} bytes as the name of a file; at most {MAX_TITLE_BYTES} fit everywhere")
     if title.partition(".")[0].rstrip().upper() in _DEVICES:
         raise rejected("is a device on Windows, where recordings may be looked at; add a word to it")
+    if stands_beside(title):
+        raise rejected("is the name of a file that stands beside the folders of scenarios; add a word to it")
     if title != title.strip() or title.endswith("."):
         raise rejected("must not begin or end with a space, nor end with '.'; some file systems drop them")
     if hidden := _INVISIBLE.search(title):

@@ -172,17 +172,17 @@ class Quantity:
     at_most: float | None = None
     infinite: bool = False
     exact: bool = False
-    words: tuple[tuple[str, float], ...] = ()
+    words: tuple[tuple[str, Any], ...] = ()
 
     def parse(self, value: object) -> float | Fraction:
-        """Return the value in SI.
+        """Return the value in SI, or what a word stands for.
 
         Raises:
             PydanticCustomError: it is something else, has a wrong unit, or is outside the limits.
         """
         for word, meant in self.words:
             if value == word:
-                return meant
+                return meant  # type: ignore[no-any-return]
         if self.words and isinstance(value, str) and value.strip().isalpha():
             choices = ", ".join(word for word, _ in self.words)
             raise _rejected(f"is none of {choices}, and not {self.dimension.name}; {self.dimension.what_works}")
@@ -287,6 +287,10 @@ Range = Annotated[float, Quantity("Range", LENGTH, above=0.0, infinite=True)]
 Angle = Annotated[float, Quantity("Angle", ANGLE, at_least=-_FAR, at_most=_FAR)]
 Aperture = Annotated[float, Quantity("Aperture", ANGLE, above=0.0, at_most=FULL_TURN)]
 Time = Annotated[float, Quantity("Time", TIME, at_least=0.0, at_most=1e9)]
+LongestGap = Annotated[float, Quantity("LongestGap", TIME, above=0.0, at_most=1e9)]
+ClockOffset = Annotated[
+    float | None, Quantity("ClockOffset", TIME, at_least=-1e9, at_most=1e9, words=(("estimate", None),))
+]
 Duration = Annotated[Fraction, Quantity("Duration", TIME, at_least=0.0, at_most=1e9, exact=True)]
 Delay = Annotated[Fraction, Quantity("Delay", TIME, at_least=0.0, at_most=1e9, exact=True)]
 Rate = Annotated[Fraction, Quantity("Rate", FREQUENCY, above=0.0, at_most=1e9, exact=True)]

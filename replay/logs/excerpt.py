@@ -5,7 +5,8 @@ The bytes depend on the messages and the note alone, so that cutting an excerpt 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from replay.logs.mcap_records import Schema
 from replay.logs.mcap_writer import McapFileWriter
@@ -18,6 +19,26 @@ EXCERPT = "excerpt"
 class _Bytes(bytearray):
     def write(self, data: bytes | memoryview, /) -> None:
         self.extend(data)
+
+
+def joined(first: bytes, second: bytes, open_log: Callable[[bytes], MessageLog]) -> bytes:
+    """Return what two excerpts of one log hold as one; a message that is in both stands there once.
+
+    Args:
+        first, second: as of `write_messages`, with the same note.
+        open_log: returns the log that a file holds.
+    """
+    log, other = open_log(first), open_log(second)
+    known = {**log.channels, **other.channels}
+    schemas: dict[int, Schema] = {}
+    channels = {}
+    for number, channel in known.items():  # the same schema has another number in the other file
+        schema = (log if number in log.channels else other).schema(channel)
+        channels[number] = replace(channel, schema_id=number + 1 if schema is not None else 0)
+        schemas |= {} if schema is None else {number + 1: schema}
+    found = dict.fromkeys(message for one in (log, other) for message in one.messages(one.channels.keys()))
+    messages = sorted(found, key=lambda message: message.time)
+    return write_messages(messages, MessageLog(channels, schemas, other.messages), log.metadata[EXCERPT])
 
 
 def write_messages(messages: Sequence[Message], log: MessageLog, origin: Mapping[str, str]) -> bytes:

@@ -21,6 +21,8 @@ from replay.numerics.arrays import Floats
 
 _WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
 _WITH_POINT = re.compile(r"[-+]?[0-9]*\.[0-9]*([eE][-+]?[0-9]+)?")
+_WORDS = {"true": 1.0, "false": 0.0}
+_NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 _DATE_LIKE = re.compile(r"[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4}|[0-9]{1,2}:[0-9]{2}")
 
 
@@ -42,34 +44,58 @@ def read_csv(name: str, data: bytes, format: Format, needed: Collection[str], ma
         RecordingError: the file is empty or not UTF-8, there is no such column, a line has another number of cells, or
             a cell is no finite number, or a time beyond 146 years.
     """
-    return _Log(name, CsvTable(name, data, format), format, needed, max_gap).log()
+    return CsvNumbers(name, CsvTable(name, data, format), format, needed, max_gap).log()
 
 
-class _Log:
-    """The numbers of a table."""
+class CsvNumbers:
+    """The numbers of a table.
 
-    def __init__(self, name: str, table: CsvTable, format: Format, needed: Collection[str], max_gap: int) -> None:
+    Attributes:
+        times: of its rows [ns].
+        skip: leading rows that are left out: their times are 0, as before a clock is there.
+        headings: of the columns that are needed.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        table: CsvTable,
+        format: Format,
+        needed: Collection[str],
+        max_gap: int,
+        *,
+        readings: bool = False,
+    ) -> None:
+        """Read the times of a table.
+
+        Args:
+            name, format, needed, max_gap: as of `read_csv`.
+            table: the file's cells.
+            readings: columns may also hold what is not finite, and true and false, as positions may not.
+        """
         self._name = name
+        self._readings = readings
         self._table = table
         self._format = format
-        self._needed = {h for h in table.headings if h in needed or _joint(h) in needed}
+        self.headings = {h for h in table.headings if h in needed or (_joint(h) in needed and not readings)}
         self._at = table.headings.index(table.time)
         self._decimal = format.decimal or self._found_decimal()
         self._unit = self._time_unit()
-        self._times = self._read_times()
-        self._skip = leading_zeros(self._times, max_gap)
+        self.times = self._read_times()
+        self.skip = leading_zeros(self.times, max_gap)
 
     def log(self) -> JointLog:
-        table, times = self._table, self._times
+        """Return all columns that hold numbers as joints."""
+        table, times = self._table, self.times
         joints = {}
         for column, heading in enumerate(table.headings):
             if heading and column != self._at:
-                series = self._series(column, heading)
+                series = self.series(column, heading)
                 if series is not None:
                     joints[heading] = series
         if not joints:
             raise RecordingError(self._name, "has no samples of joints")
-        first, last = self._skip, max(range(self._skip, len(times)), key=times.__getitem__)
+        first, last = self.skip, max(range(self.skip, len(times)), key=times.__getitem__)
         later = (index for index in range(first, len(times)) if times[index] > times[first])
         return JointLog(
             joints=joints,
@@ -77,30 +103,34 @@ class _Log:
             begin=min(times[first:]),
             end=times[last],
             anchor=(first, *itertools.islice(later, 1), last),
-            left_out=self._skip,
-            cut=self._cut,
+            left_out=self.skip,
+            cut=self.cut,
             origin=table.origin,
             published=False,
+            headings=(table.time, *sorted(self.headings)),
         )
 
-    def _series(self, column: int, heading: str) -> Series | None:
+    def series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column; None without any, or if it holds something else and is not needed."""
         cells = self._table.columns[column]
-        row = np.array([k for k in range(self._skip, len(cells)) if cells[k]], dtype=np.int64)
-        values = _values([cells[k] for k in row.tolist()], self._decimal)
+        row = np.array([k for k in range(self.skip, len(cells)) if cells[k]], dtype=np.int64)
+        known = [cells[k] for k in row.tolist()]
+        values = _values(known, self._decimal, _WORDS if self._readings else {})
         wrong = np.flatnonzero(~np.isfinite(values))
-        if len(wrong) and heading in self._needed:
+        if self._readings:
+            wrong = np.array([k for k in wrong.tolist() if not _NOT_FINITE.fullmatch(known[k])], dtype=np.int64)
+        if len(wrong) and heading in self.headings:
             index = int(row[wrong[0]])
             raise RecordingError(self._name, self._no_number(index, heading, cells[index]))
         if len(wrong) or not len(row):
             return None
-        time = np.array(self._times, dtype=np.int64)[row]
+        time = np.array(self.times, dtype=np.int64)[row]
         first = unrepeated(time, values)
         return Series(time[first], values[first], row[first])
 
     def _found_decimal(self) -> str:
         """Return the sign between whole and decimal digits: a comma where numbers have one and none has a point."""
-        read = {*self._needed, self._table.time}
+        read = {*self.headings, self._table.time}
         columns = [c for h, c in zip(self._table.headings, self._table.columns, strict=True) if h in read]
         comma = self._first_line(columns, ",", _WITH_COMMA)
         if comma is None:
@@ -163,9 +193,10 @@ class _Log:
             return f"{rule}; if the point is a decimal one, state decimal: '.'"
         return rule
 
-    def _cut(self, rows: Sequence[int], origin: Mapping[str, str]) -> bytes:
-        """Return some lines and the columns that were needed, cell by cell as they are written."""
-        columns = [k for k, h in enumerate(self._table.headings) if k == self._at or h in self._needed]
+    def cut(self, rows: Sequence[int], origin: Mapping[str, str], also: Collection[str] = ()) -> bytes:
+        """Return some lines and the columns that were needed, and others, cell by cell as they are written."""
+        kept = {self._table.time, *self.headings, *also}
+        columns = [k for k, h in enumerate(self._table.headings) if h in kept]
         out = io.StringIO()
         out.write(f"# {EXCERPT} of {origin.get('name', '')}, sha256 {origin.get('sha256', '')}\n")
         writer = csv.writer(out, delimiter=self._table.separator, lineterminator="\n")
@@ -179,8 +210,8 @@ def _joint(heading: str) -> str:
     return unit_of(heading)[0].removesuffix(" position")
 
 
-def _values(cells: Sequence[str], decimal: str) -> Floats:
-    """Return the numbers in cells, NaN for what is none or not finite."""
+def _values(cells: Sequence[str], decimal: str, words: Mapping[str, float]) -> Floats:
+    """Return the numbers in cells, and what words stand for; NaN for what is neither."""
     if decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]
     try:
@@ -188,10 +219,12 @@ def _values(cells: Sequence[str], decimal: str) -> Floats:
             return np.array(list(map(float, cells)), dtype=np.float64) + 0.0
     except ValueError:
         pass
-    return np.array([_value(cell) for cell in cells], dtype=np.float64)
+    return np.array([_value(cell, words) for cell in cells], dtype=np.float64)
 
 
-def _value(cell: str) -> float:
+def _value(cell: str, words: Mapping[str, float]) -> float:
+    if words and cell.lower() in words:
+        return words[cell.lower()]
     try:
         return math.nan if "_" in cell else float(cell)  # 1_000 is a number to Python only
     except ValueError:

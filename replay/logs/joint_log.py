@@ -58,6 +58,7 @@ class JointLog:
         cut: given rows and a note on where they come from, returns a file that reads as these rows of the log do.
         origin: the note that a log carries which was cut out of another one; else empty.
         published: whether the samples are messages, so that there may be several publishers.
+        headings: of a table, the columns that were needed, and that of the times.
     """
 
     joints: Mapping[str, Series]
@@ -69,6 +70,7 @@ class JointLog:
     cut: Callable[[Sequence[int], Mapping[str, str]], bytes]
     origin: Mapping[str, str]
     published: bool
+    headings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -180,12 +180,12 @@ def _json(data: bytes, whole: str) -> list[Sample]:
         joints = [_object(joint, "a joint") for joint in message["joints"]]
         told = [joint for joint in joints if "position" in joint]
         names = tuple(_text(joint.get("name")) for joint in told)
-        return [Sample(_stamp(message.get("timestamp")), "", names, [_number(joint["position"]) for joint in told])]
+        return [Sample(time_stamp(message.get("timestamp")), "", names, [_number(joint["position"]) for joint in told])]
     if "name" not in message or "position" not in message:
         raise ValueError(f"it has neither joints nor name and position, but {', '.join(map(repr, message))}")
     header = _object(message.get("header") or {}, "its header")
     pairs = _told([_text(name) for name in message["name"]], [_number(value) for value in message["position"]])
-    return [Sample(_stamp(header.get("stamp")), _text(header.get("frame_id", "")), *pairs)]
+    return [Sample(time_stamp(header.get("stamp")), _text(header.get("frame_id", "")), *pairs)]
 
 
 def _json_transform(message: Mapping[str, Any]) -> Sample:
@@ -198,7 +198,7 @@ def _json_transform(message: Mapping[str, Any]) -> Sample:
     translation, rotation = (_object(body.get(key) or {}, key) for key in ("translation", "rotation"))
     axes = [(translation, axis) for axis in "xyz"] + [(rotation, axis) for axis in "xyzw"]
     pose = tuple(_number(part.get(axis, 0.0)) for part, axis in axes)
-    return Sample(_stamp(stamp), _text(parent), (_text(child),), [pose])
+    return Sample(time_stamp(stamp), _text(parent), (_text(child),), [pose])
 
 
 def _numbers(values: Mapping[str, Any], axes: str) -> tuple[float, ...]:
@@ -212,7 +212,8 @@ def _told(names: Sequence[str], positions: Sequence[float]) -> tuple[tuple[str, 
     return tuple(names[: len(positions)]), positions
 
 
-def _stamp(value: Any) -> int:
+def time_stamp(value: Any) -> int:
+    """Return a time stamp of a message [ns]: seconds and nanoseconds, a date, or 0 for none; ValueError for others."""
     if isinstance(value, str):  # protobuf's JSON writes a time as a date
         moment = date_nanoseconds(value)
         if moment is None:
@@ -257,9 +258,3 @@ def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError(f"the name of a joint is {json.dumps(value)[:60]}, no text")
     return value
-
-
-def is_of(channel: Channel, schema: Schema | None, kinds: Iterable[str]) -> bool:
-    """Return whether a channel may hold messages of these kinds: by its schema, or JSON without one that says."""
-    kind = kind_of(schema)
-    return kind in kinds or (channel.encoding == "json" and kind not in JOINTS + TRANSFORMS)

@@ -35,12 +35,14 @@ class MessageLog:
         schemas: by id.
         messages: yields the messages of some channels, in the order of the file.
         metadata: values of its metadata records, by their names.
+        mcap: the file itself, where it is one: its messages can be had many at a time.
     """
 
     channels: Mapping[int, Channel]
     schemas: Mapping[int, Schema]
     messages: Callable[[Collection[int]], Iterator[Message]]
     metadata: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    mcap: McapLog | None = None
 
     def schema(self, channel: Channel) -> Schema | None:
         """Return the schema of a channel."""
@@ -151,7 +153,7 @@ def _mcap(name: str, data: bytes) -> MessageLog:
                     for time, message in zip(run.time.tolist(), run.messages(), strict=True):
                         yield Message(run.channel, time, message)
 
-    return MessageLog(log.channels, log.schemas, messages, dict(log.metadata))
+    return MessageLog(log.channels, log.schemas, messages, dict(log.metadata), log)
 
 
 def _unpacked(name: str, data: bytes) -> bytes:

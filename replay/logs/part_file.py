@@ -7,6 +7,7 @@ import errno
 import itertools
 import json
 import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -231,6 +232,13 @@ def refuse_link(path: Path) -> None:
         raise write_error(path, error) from None
     if linked:
         raise WriteError(str(path), "it is a link, and nothing is written through links here; remove it")
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder with all that is in it, as far as that goes; what is no folder, such as a pipe, stays."""
+    with contextlib.suppress(OSError):
+        if folder.is_dir() and not folder.is_symlink():
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def json_line(value: Any) -> str:

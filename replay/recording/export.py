@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -33,6 +35,9 @@ Table = dict[str, Column]
 Format = Literal["csv", "json", "parquet"]
 
 FORMATS: tuple[Format, ...] = ("csv", "json", "parquet")
+
+_NAME_BYTES = 200  # file systems take names of 255 bytes; a number, an ending and ".part" are added
+_TOPIC_LETTERS = 20  # of a topic's that are kept whatever the recording is called
 
 
 def tables(recording: Recording) -> dict[str, Table]:
@@ -162,16 +167,20 @@ def _vector(table: Table, name: str, unit: str, values: Column, letters: str) ->
 def _file_names(stem: str, topics: Collection[str], extension: str) -> dict[str, str]:
     """Return a file name for each topic: letters that a path may not have are replaced, names stay different.
 
-    They differ in more than upper and lower case, which some file systems take for the same. All topics of a recording
-    are named together, so that a topic has the same file whichever others are wanted.
+    They differ in more than upper and lower case, which some file systems take for the same, and fit file systems. All
+    topics of a recording are named together, so that a topic has the same file whichever others are wanted.
     """
     names: dict[str, str] = {}
     taken: set[str] = set()
+    numbers: Counter[str] = Counter()
+    room = max(_NAME_BYTES - len(os.fsencode(stem)), _TOPIC_LETTERS)
     for topic in topics:
-        base = f"{stem}.{re.sub(r'[^A-Za-z0-9_-]+', '_', topic).strip('_')}"
-        name, number = f"{base}.{extension}", 2
+        base = f"{stem}.{re.sub(r'[^A-Za-z0-9_-]+', '_', topic).strip('_')[:room]}"
+        key = base.casefold()
+        name = f"{base}.{extension}"
         while name.casefold() in taken:
-            name, number = f"{base}_{number}.{extension}", number + 1
+            numbers[key] += 1
+            name = f"{base}_{numbers[key] + 1}.{extension}"
         taken.add(name.casefold())
         names[topic] = name
     return names

@@ -27,7 +27,7 @@ TRANSFORMS = "foxglove.FrameTransforms"
 SCENE = "foxglove.SceneUpdate"
 LOG = "foxglove.Log"
 LAYOUT = "replay.Layout"
-LAYOUT_NAMES = ("links", "joints", "pairs", "shapes", "objects", "sensors")
+LAYOUT_NAMES = ("links", "joints", "pairs", "shapes", "objects", "sensors", "guards")
 """Fields of Layout, lists of names, in the order of their numbers from 1 on."""
 EARLIEST = 1000
 """Number of the field `earliest` of Log."""

@@ -21,7 +21,6 @@ from replay.recording.viewer_process import LOOPBACK, free_port, quarters, runni
 
 _STARTUP = 60.0  # [s] until the viewer must answer
 _LOADING = 120.0  # [s] until the picture must have come to rest
-_TOASTS = 9.0  # [s] the viewer's own notices stand over the picture when it starts
 _PAUSE = 0.5
 _TYPED = 10_000_000  # [ns] by which a moment may be after the end: the end typed with few digits
 
@@ -41,7 +40,7 @@ def picture(
         recording: an `.rrd` file.
         png: the picture to write.
         at: moment to show [s] from the start; its end when None.
-        size: width and height of the viewer's window [points]; the picture has two pixels a point.
+        size: width and height of the viewer's window [pixels], and of a picture of all of it.
         camera: from where the scene is looked at; as the recording says when None.
         only_scene: the scene alone, without the window around it, its charts and tables.
 
@@ -55,7 +54,6 @@ def picture(
     if not recording.is_file():
         raise ViewerError(f"{recording}: no such file")
     with _arranged(recording.resolve(), camera, only_scene) as (file, view), _viewer(file, size) as viewer:
-        began = time.monotonic()
         state = _when(viewer.get_state, lambda s: s.recordings and not s.loading, _LOADING, f"{recording}: not loaded")
         shown = state.recordings[0]
         lines = {line.name: line for line in shown.timelines}
@@ -66,7 +64,6 @@ def picture(
         if moment > end + _TYPED:
             raise ViewerError(f"{recording}: has no moment {at:g} s; it ends at {end / 1e9:g} s")
         viewer.set_time(TIMELINE, duration=_nanoseconds(min(moment, end)), play_state="paused")
-        time.sleep(max(0.0, _TOASTS - (time.monotonic() - began)))
         before, now = b"", None
         deadline = time.monotonic() + _LOADING
         while now is None or now != before:
@@ -103,6 +100,7 @@ def _viewer(recording: Path, size: tuple[int, int]) -> Iterator[Any]:
     command += ["--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen"]
     with tempfile.TemporaryFile("w+") as log, quarters() as where:
         command.append(_plain_name(recording, where.home))
+        where.environment["RUST_LOG"] = "error"  # what it would tell beside that stands over the picture for seconds
         with running(command, where, stdout=log, stderr=subprocess.STDOUT) as process:
             yield _connect(ViewerClient, f"rerun+http://{LOOPBACK}:{port}/proxy", process, log)
 
@@ -136,7 +134,8 @@ def _cause(log: str) -> str:
     """Return why a viewer stopped, from what it said."""
     if missing := re.search(r"No glyph for (\S+ \(U\+\w+\))", log):
         return f"its font has no letter {missing[1]}, which is in a name or a text that it shows"
-    if "adapter" in log.lower() and "adapter backend" not in log.lower():  # the second says which one it found
+    without = ("graphics adapter", "render context")
+    if any(words in log for words in without):
         return "it found no Vulkan driver; on Debian, apt-get install mesa-vulkan-drivers"
     lines = [line for line in log.splitlines() if "panicked at" in line] or log.strip().splitlines()[-1:]
     return lines[0] if lines else "no message"

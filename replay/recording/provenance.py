@@ -51,7 +51,8 @@ class Provenance:
         libraries: versions of the libraries that numbers may depend on.
         block_frames: frames a block.
         format: version of the recording format.
-        originals: name and SHA-256 of the file that an attachment is an excerpt of, by the attachment's name.
+        originals: name and SHA-256 of the file that an attachment is an excerpt of, by the attachment's name; and its
+            `use`, of one that no reading depends on: "measured".
     """
 
     scenario: str

@@ -7,6 +7,7 @@ message; only the attachments that are no text are missing, and its provenance s
 from __future__ import annotations
 
 import re
+import stat
 import struct
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
@@ -123,14 +124,23 @@ def _holds(file: Path, data: bytes) -> bool:
 def _object(recording: Path, name: str, digest: str) -> bytes:
     if not is_digest(digest):
         raise RecordingError(str(recording), f"damaged: what its metadata states of {name!r} is no SHA-256")
-    places = [folder / OBJECTS / digest for folder in recording.absolute().parents]
-    place = next((place for place in places if place.is_file()), None)
-    if place is None:
-        raise RecordingError(str(recording), f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}")
-    size = place.stat().st_size
-    if size > limits.FILE:
-        raise RecordingError(str(place), f"has {size} bytes; at most {limits.FILE} are read")
-    data = place.read_bytes()
+    unread: RecordingError | None = None
+    for place in (folder / OBJECTS / digest for folder in recording.absolute().parents):
+        try:
+            found = place.stat()
+            if not stat.S_ISREG(found.st_mode):
+                continue
+            if found.st_size > limits.FILE:
+                raise RecordingError(str(place), f"has {found.st_size} bytes; at most {limits.FILE} are read")
+            data = place.read_bytes()
+            break
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:  # it may stand in a folder further up
+            unread = unread or RecordingError(str(place), f"{name!r} cannot be read: {error.strerror}")
+    else:
+        rule = f"needs {name!r}, which is neither attached nor in a folder {OBJECTS!r}"
+        raise unread or RecordingError(str(recording), rule)
     if is_lfs_pointer(data):
         raise RecordingError(str(place), LFS_POINTER)
     if sha256(data) != digest:

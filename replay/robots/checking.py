@@ -120,7 +120,7 @@ def random_positions(machine: Linkage, samples: int) -> Floats:
             half = 1.0 if joint.type.unit == "m" else 0.5 * FULL_TURN
             lower = lower if math.isfinite(lower) else (upper - 2.0 * half if math.isfinite(upper) else -half)
             upper = upper if math.isfinite(upper) else lower + 2.0 * half
-            positions[:, k] = random.uniform(lower, upper, samples)
+            positions[:, k] = lower + (upper - lower) * random.random(samples)
     return machine.followed(positions)
 
 

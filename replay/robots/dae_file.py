@@ -98,7 +98,10 @@ def _parts(file: Any, path: Path) -> Iterator[Floats]:
     """Yield the triangles of each geometry in each of its places, in the file's unit and axes."""
     count = visits = 0
     if file.scene is None:
-        raise RobotError(str(path), "has no scene")
+        reasons = "; ".join(" ".join(str(error).split())[:200] for error in file.errors[-2:])
+        raise RobotError(str(path), f"has no scene that can be used{': ' * bool(reasons)}{reasons}")
+    if len(file.scene.nodes) != sum(str(element.tag).endswith("}node") for element in file.scene.xmlnode):
+        raise ValueError("its scene has a <node> that cannot be used")
     waiting = [(node, np.eye(4), 0) for node in reversed(file.scene.nodes)]
     while waiting:
         node, pose, depth = waiting.pop()
@@ -107,19 +110,42 @@ def _parts(file: Any, path: Path) -> Iterator[Floats]:
             most = f"{limits.GLB_ENTRIES} nodes, {limits.ROBOT_DEPTH} deep"
             raise RobotError(str(path), f"has a scene of more than the {most}, that are read")
         kind = type(node).__name__
-        if kind == "GeometryNode":
-            for primitive in node.geometry.primitives:
-                corners = _corners(primitive)
-                count += len(corners)
-                if count > limits.TRIANGLES:
-                    raise RobotError(str(path), f"has more than the {limits.TRIANGLES} triangles that are read")
-                if len(corners):
-                    yield _placed(pose, corners)
-        elif kind == "NodeNode":
+        if kind == "NodeNode":
             waiting.append((node.node, pose, depth + 1))
         elif kind == "Node":
             below = _product(pose, np.asarray(node.matrix, dtype=np.float64))
+            for geometry in _geometries(node, file):
+                for corners in map(_corners, geometry.primitives):
+                    count += len(corners)
+                    if count > limits.TRIANGLES:
+                        raise RobotError(str(path), f"has more than the {limits.TRIANGLES} triangles that are read")
+                    if len(corners):
+                        yield _placed(below, corners)
             waiting.extend((child, below, depth + 1) for child in reversed(node.children))
+
+
+def _geometries(node: Any, file: Any) -> list[Any]:
+    """Return the geometries that a node has, by its XML: pycollada drops those whose colours it cannot find.
+
+    Raises:
+        ValueError: it has something, which pycollada has dropped, that shows a body or moves one.
+    """
+    tags = [str(element.tag).rpartition("}")[2] for element in node.xmlnode]
+    for tag in ("instance_controller", "skew"):
+        if tag in tags:
+            raise ValueError(f"a node has <{tag}>, which is not read")
+    kinds = [type(child).__name__ for child in node.children]
+    for tag, kind in (("instance_node", "NodeNode"), ("node", "Node")):
+        if tags.count(tag) != kinds.count(kind):
+            raise ValueError(f"a node has a <{tag}> that cannot be used")
+    found = []
+    for element, tag in zip(node.xmlnode, tags, strict=True):
+        if tag == "instance_geometry":
+            name = element.get("url", "").removeprefix("#")
+            if name not in file.geometries:
+                raise ValueError(f"a node has the geometry {name[:60]!r}, which is not there or cannot be used")
+            found.append(file.geometries[name])
+    return found
 
 
 def _corners(primitive: Any) -> Floats:

@@ -99,11 +99,17 @@ class Packages:
         for root in roots:
             if (root / inside).is_file():
                 return Found(self._existing(root / inside, (root,), written, element))
-        # A description that was moved without the name of its package: its own tree has the file all the same.
-        for folder in self._above if name not in self._given else ():
-            if len(folder.parts) > 1 and (folder / inside).is_file():
-                found = self._existing(folder / inside, (self._tree,), written, element)
-                return Found(found, f"package {name} is taken to be {folder}")
+        for taken, folder, path in self._moved(name, steps) if name not in self._given else ():
+            if len(folder.parts) > 1 and path.is_file():
+                found = self._existing(path, (self._tree,), written, element)
+                return Found(found, f"{taken} is taken to be {folder}")
+        deeper = [] if name in self._given else [folder for folder in self._inside(name) if (folder / inside).is_file()]
+        if len(deeper) > 1:
+            rule = f"is in each of {', '.join(map(str, deeper[:5]))}; say in which with --package {name}=DIR"
+            raise element.wrong(f"{written[:200]!r} {rule}")
+        if deeper:
+            found = self._existing(deeper[0] / inside, (self._tree,), written, element)
+            return Found(found, f"package {name} is taken to be {deeper[0]}")
         looked = [root / inside for root in roots]
         if not looked:
             folders = ", ".join(str(folder) for folder in (*self._above, *self._search_path))
@@ -111,6 +117,27 @@ class Packages:
         else:
             rule = f"looked for {', '.join(map(str, looked))}"
         raise element.wrong(f"{written[:200]!r} is not to be found: {rule}; give its folder with --package {name}=DIR")
+
+    def _moved(self, name: str, steps: tuple[str, ...]) -> Iterator[tuple[str, Path, Path]]:
+        """Yield what of a package may be which folder above the description, and the file in it.
+
+        The own tree of a description that was moved has the file all the same: without the name of the package, or
+        without the first steps of the way, where one that follows has the name of the folder.
+        """
+        for folder in self._above:
+            yield f"package {name}", folder, folder.joinpath(*steps)
+        for folder in self._above:
+            for k in (k for k, step in enumerate(steps[:-1]) if step == folder.name):
+                yield f"package {'/'.join((name, *steps[: k + 1]))}", folder, folder.joinpath(*steps[k + 1 :])
+
+    def _inside(self, name: str) -> list[Path]:
+        """Return the folders of a name anywhere in what the description's folder, or the one above it, holds."""
+        return [folder for folder in self._below if folder.name == name]
+
+    @cached_property
+    def _below(self) -> tuple[Path, ...]:
+        near = [folder for folder in self._above[:2] if len(folder.parts) > 2]  # never a folder of the whole system
+        return tuple(dict.fromkeys(_walk(near[-1:], into_packages=True)))
 
     def _existing(self, path: Path, trees: Iterable[Path], written: str, element: XmlElement) -> Path:
         """Return a path that is a file; RobotError if it is none, or not in one of the trees."""
@@ -164,14 +191,14 @@ def _beside(folder: Path, name: str) -> Iterator[Path]:
             yield root
 
 
-def _walk(roots: Iterable[Path]) -> Iterator[Path]:
+def _walk(roots: Iterable[Path], *, into_packages: bool = False) -> Iterator[Path]:
     """Yield folders and what is in them, breadth first, down to packages, and no more than are looked into."""
     waiting = list(roots)
     for number, folder in enumerate(waiting):
         if number >= limits.ROBOT_FOLDERS:
             return
         yield folder
-        if not (folder / "package.xml").is_file():
+        if into_packages or not (folder / "package.xml").is_file():
             waiting.extend(_folders(folder))
 
 

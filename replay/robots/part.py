@@ -89,6 +89,8 @@ def _pose(origin: Origin) -> Entry:
         entry["xyz"] = list(origin.xyz)
     if any(origin.rpy):
         entry["rpy"] = list(origin.rpy)
+    if origin.quat_xyzw is not None and any(origin.quat_xyzw[:3]):
+        entry["quat_xyzw"] = list(origin.quat_xyzw)
     return entry
 
 
@@ -124,7 +126,7 @@ def _joint(joint: RobotJoint, links: RobotNames, joints: RobotNames, robot: Robo
 def _without_conflicts(robot: Robot, changes: list[RobotChange]) -> Mapping[str, RobotJoint]:
     """Return the joints, those that follow none that has a position held where they are.
 
-    Limits of joints that follow are left out where their leader could be nowhere with them.
+    Limits of joints that follow are left out where their leader could be nowhere with them, or in one place alone.
     """
     found = dict(robot.joints)
     for name, joint in robot.joints.items():
@@ -149,7 +151,7 @@ def _without_conflicts(robot: Robot, changes: list[RobotChange]) -> Mapping[str,
         if multiplier != 0.0:
             ends = sorted((bound - offset) / multiplier for bound in (joint.limits.lower, joint.limits.upper))
             lower, upper = max(room[leader][0], ends[0]), min(room[leader][1], ends[1])
-            fits = lower <= upper
+            fits = lower < upper or (lower == upper and room[leader][0] == room[leader][1])
         else:
             lower, upper = room[leader]
             fits = joint.limits.lower <= offset <= joint.limits.upper
@@ -158,7 +160,7 @@ def _without_conflicts(robot: Robot, changes: list[RobotChange]) -> Mapping[str,
         else:
             rule = f"its limits {joint.limits.lower:g} and {joint.limits.upper:g} are dropped"
             changes.append(
-                RobotChange(f"joint {name}", f"{rule}: they leave no position to {leader}, which it follows", True)
+                RobotChange(f"joint {name}", f"{rule}: they leave nowhere to go to {leader}, which it follows", True)
             )
             found[name] = replace(joint, limits=replace(joint.limits, lower=-math.inf, upper=math.inf))
     return found
@@ -214,6 +216,10 @@ def _shape(body: RobotBody, meshes: RobotMeshes) -> Entry:
     match geometry.kind:
         case "box":
             return {"type": "cuboid", "size": list(geometry.sizes)}
+        case "plane":
+            return {"type": "plane", "size": list(geometry.sizes)}
+        case "ellipsoid":
+            return {"type": "ellipsoid", "radii": list(geometry.sizes)} | _chord(max(geometry.sizes))
         case "sphere":
             return {"type": "sphere", "radius": geometry.sizes[0]} | _chord(geometry.sizes[0])
         case "capsule" if geometry.sizes[1] < SMALLEST:

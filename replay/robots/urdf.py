@@ -19,23 +19,24 @@ from replay.robots.description import (
     RobotJoint,
     RobotLink,
     Triple,
+    triple,
 )
 from replay.robots.numbers import number, numbers, size
-from replay.robots.xml_text import XmlElement, parse
+from replay.robots.xml_text import XACRO, XmlElement
 
 _TYPES = ("fixed", "revolute", "continuous", "prismatic", "floating", "planar")
 _OF_A_LINK = {"visual", "collision", "inertial"}
 _OF_A_JOINT = {"parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"}
+_OF_A_BODY = {"origin", "geometry", "material"}
 _UNUSED = "is not used: replay moves links along their scripts and knows no forces"
 
 
-def read(path: Path, data: bytes) -> Robot:
-    """Return the robot that a URDF file describes.
+def read(path: Path, root: XmlElement) -> Robot:
+    """Return the robot that a URDF file describes, given its root element.
 
     Raises:
-        RobotError: it is no URDF, or contradicts itself: the first thing that is wrong, with its line.
+        RobotError: it contradicts itself: the first thing that is wrong, with its line.
     """
-    root = parse(path, data, root="robot")
     changes: list[RobotChange] = []
     colors = _colors(root, changes)
     links: dict[str, RobotLink] = {}
@@ -47,7 +48,8 @@ def read(path: Path, data: bytes) -> Robot:
             )
         links[link.name] = link
     if not links:
-        raise root.wrong("the robot has no link")
+        left = next((child for child in root.children if child.tag.startswith(XACRO)), None)
+        raise root.wrong(f"the robot has no link{'' if left is None else f', but <{left.tag[:100]}>, which {_MACRO}'}")
     joints: dict[str, RobotJoint] = {}
     for element in root.all("joint"):
         joint = _joint(element, changes)
@@ -58,9 +60,18 @@ def read(path: Path, data: bytes) -> Robot:
     top = _root(root, links, joints)
     _check_mimics(joints)
     others = Counter(child.tag for child in root.children if child.tag not in ("link", "joint", "material"))
-    changes.extend(RobotChange(f"{times} x <{tag}>", "is not used") for tag, times in sorted(others.items()))
+    changes.extend(_unread(f"{times} x <{tag[:100]}>", "", tag) for tag, times in sorted(others.items()))
     name = root.attributes.get("name", "").strip() or path.stem
     return Robot(name, links, _parents_first(top, joints), top, changes)
+
+
+_MACRO = "is a macro of xacro that was not expanded: what it stands for is missing"
+
+
+def _unread(place: str, what: str, tag: str) -> RobotChange:
+    """Return what is told of an element that is not read; a macro in it may stand for a body or a joint."""
+    macro = tag.startswith(XACRO)
+    return RobotChange(place, f"{what} {_MACRO if macro else 'is not used'}".strip(), physical=macro)
 
 
 def _colors(root: XmlElement, changes: list[RobotChange]) -> dict[str, str]:
@@ -93,7 +104,7 @@ def _link(element: XmlElement, colors: Mapping[str, str], changes: list[RobotCha
     if element.first("inertial") is not None:
         changes.append(RobotChange(place, f"inertia {_UNUSED}"))
     for tag in sorted({child.tag for child in element.children} - _OF_A_LINK):
-        changes.append(RobotChange(place, f"<{tag}> is not used"))
+        changes.append(_unread(place, f"<{tag[:100]}>", tag))
     return RobotLink(name, bodies["collision"], bodies["visual"], element)
 
 
@@ -108,6 +119,8 @@ def _bodies(link: XmlElement, kind: str, colors: Mapping[str, str], changes: lis
             raise element.wrong(rule)
         geometry = _SHAPES[shapes[0].tag](shapes[0])
         color = _color(element.first("material"), colors, changes)
+        for tag in sorted({child.tag for child in element.children} - _OF_A_BODY):
+            changes.append(RobotChange(f"link {link.text('name')}", f"<{tag[:100]}> of a <{kind}> is not used"))
         found.append(RobotBody(element.attributes.get("name", "").strip(), _origin(element), geometry, color, element))
     return found
 
@@ -132,7 +145,7 @@ def _mesh(element: XmlElement) -> Geometry:
     if len(element.attributes.get("scale", "").split()) == 1:
         scale = (number(element, "scale"),) * 3
     else:
-        scale = _triple(numbers(element, "scale", 3, (1.0, 1.0, 1.0)))
+        scale = triple(numbers(element, "scale", 3, (1.0, 1.0, 1.0)))
     if 0.0 in scale:
         raise element.wrong(f"<mesh> has scale={element.text('scale')!r}, which leaves it no extent")
     return Geometry("mesh", file=file, scale=scale)
@@ -146,12 +159,7 @@ def _origin(element: XmlElement) -> Origin:
     if written is None:
         return Origin()
     zero = (0.0, 0.0, 0.0)
-    return Origin(_triple(numbers(written, "xyz", 3, zero)), _triple(numbers(written, "rpy", 3, zero)))
-
-
-def _triple(values: tuple[float, ...]) -> Triple:
-    x, y, z = values
-    return x, y, z
+    return Origin(triple(numbers(written, "xyz", 3, zero)), triple(numbers(written, "rpy", 3, zero)))
 
 
 def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
@@ -168,7 +176,7 @@ def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
     axis: Triple = (1.0, 0.0, 0.0)
     written = element.first("axis")
     if written is not None and kind in ("revolute", "continuous", "prismatic"):
-        axis = _triple(numbers(written, "xyz", 3, axis))
+        axis = triple(numbers(written, "xyz", 3, axis))
         if math.hypot(*axis) < 1e-100:
             raise written.wrong(f"joint {name!r} has the axis 0 0 0, which has no direction")
     for tag, rule in (
@@ -179,7 +187,7 @@ def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
         if element.first(tag) is not None:
             changes.append(RobotChange(place, rule))
     for tag in sorted({child.tag for child in element.children} - _OF_A_JOINT):
-        changes.append(RobotChange(place, f"<{tag}> is not used"))
+        changes.append(_unread(place, f"<{tag[:100]}>", tag))
     limits = _limits(element, name, kind, changes) if kind in ("revolute", "continuous", "prismatic") else Limits()
     origin, mimic = _origin(element), _mimic(element)
     return RobotJoint(name, kind, ends["parent"], ends["child"], origin, axis, element, limits, mimic)
@@ -211,8 +219,6 @@ def _rate(limit: XmlElement, rate: str, joint: str, changes: list[RobotChange]) 
     if not limit.attributes.get(rate, "").strip():
         return None
     value = number(limit, rate, infinite=True)
-    if value < 0.0:
-        raise limit.wrong(f"joint {joint!r} has {rate}={value:g}, which is below 0")
     if value < SLOWEST:
         rule = f"a limit of {rate} of {value:g}, by which nothing moves, is left out"
         changes.append(RobotChange(f"joint {joint}", rule))

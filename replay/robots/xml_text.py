@@ -45,13 +45,13 @@ class XmlElement:
         return value
 
 
-def parse(path: Path | str, data: bytes, *, root: str) -> XmlElement:
+def parse(path: Path | str, data: bytes, *, root: str | tuple[str, ...]) -> XmlElement:
     """Return the root element of an XML file.
 
     Args:
         path: the file, for errors.
         data: its bytes.
-        root: the tag that the root element must have.
+        root: the tag that the root element must have, or those of which it must have one.
 
     Raises:
         RobotError: it is no such file, is not well-formed, has a document type or is larger than what is read.
@@ -60,22 +60,32 @@ def parse(path: Path | str, data: bytes, *, root: str) -> XmlElement:
     if len(data) > limits.ROBOT_XML:
         raise RobotError(file, f"has {len(data)} bytes; at most {limits.ROBOT_XML} are read")
     found = _XmlBuilder(file).build(data)
-    if "xacro" in Path(file).suffixes[-1:] or _is_xacro(found):
+    if Path(file).suffix == ".xacro" or _is_xacro(found):
         name = Path(file).name
-        target = re.sub(r"(\.urdf|\.srdf)?(\.xacro)?$", "", name) + (".srdf" if ".srdf" in name else ".urdf")
+        stem = re.sub(r"(\.urdf|\.srdf)?(\.xacro)?$", "", name)
+        target = stem + ("" if name.endswith(".xacro") else "_expanded") + (".srdf" if ".srdf" in name else ".urdf")
         raise RobotError(file, f"is a xacro program, which replay does not run; expand it: xacro {file} > {target}")
-    if found.tag != root:
-        raise RobotError(file, f"begins with <{found.tag[:100]}>, not with <{root}>", line=found.line)
+    tags = (root,) if isinstance(root, str) else root
+    if found.tag not in tags:
+        wanted = " or ".join(f"<{tag}>" for tag in tags)
+        raise RobotError(file, f"begins with <{found.tag[:100]}>, not with {wanted}", line=found.line)
     return found
 
 
+XACRO = "xacro:"
+_STATEMENTS = tuple(f"{XACRO}{name}" for name in ("macro", "include", "property", "arg", "if", "unless", "element"))
+
+
 def _is_xacro(root: XmlElement) -> bool:
-    """Return whether macros are left in what is read of a robot."""
+    """Return whether a file defines or chooses what it holds, or computes something of what is read of a robot.
+
+    A call of a macro is none of these: expanding a file leaves those that nobody defines.
+    """
     waiting = [child for child in root.children if child.tag in ("link", "joint", "material") or ":" in child.tag]
     while waiting:
         element = waiting.pop()
         values = element.attributes.values()
-        if element.tag.startswith("xacro:") or any("${" in value or "$(" in value for value in values):
+        if element.tag in _STATEMENTS or any("${" in value or "$(" in value for value in values):
             return True
         waiting.extend(element.children)
     return False

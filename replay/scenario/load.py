@@ -6,13 +6,14 @@ import itertools
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from replay import limits
 from replay.errors import InvalidValue, Problem, ScenarioError
 from replay.geometry.mesh_file import FORMATS
-from replay.language.node import Node
+from replay.language.node import KeyPath, Node
 from replay.scenario.checks import check
 from replay.scenario.include import ScenarioText
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
@@ -34,6 +35,9 @@ from replay.scenario.source import (
 )
 from replay.scenario.sweep import SweepCase, SweepPart, cases, replaced
 from replay.scenario.yaml_text import parse
+
+if TYPE_CHECKING:
+    from replay.scenario.recorded import RecordedMotion
 
 VERSION = 1
 
@@ -191,8 +195,11 @@ class _File:
         if scenario is None:
             raise ScenarioError(_in_order(problems))
         scenario._provenance = provenance
+        recorded = None
         if scenario.motion.recorded is not None:
-            problems.extend(_read_log(self._library, self._text, root, scenario))
+            recorded = _read_log(self._library, self._text, root, scenario, problems)
+        if scenario.measured is not None and not problems:
+            _read_measured(self._library, self._text, root, scenario, recorded, problems)
         if problems:
             raise ScenarioError(_in_order(problems))
         problems.extend(motion_problems(scenario))
@@ -223,27 +230,65 @@ def _read_meshes(library: Library, text: ScenarioText, root: Node, provenance: S
     return problems
 
 
-def _read_log(library: Library, text: ScenarioText, root: Node, scenario: Scenario) -> list[Problem]:
-    """Read the log of recorded motion, which is looked for like a mesh, and what it says of the joints."""
+def _read_log(
+    library: Library, text: ScenarioText, root: Node, scenario: Scenario, problems: list[Problem]
+) -> tuple[str, RecordedMotion] | None:
+    """Read the log of recorded motion, which is looked for like a mesh; return its name and what it says of joints."""
     from replay.scenario.recorded import PATH, read
 
-    node, provenance = find(root, (*PATH, "file")), scenario.provenance
-    assert node is not None
-    try:
-        name = resolve_name(str(node.value), text.names[node.place.file])
-    except SourceRule as error:
-        return [problem_at(root, (*PATH, "file"), str(error))]
+    provenance = scenario.provenance
+    name = _log_name(text, root, PATH, problems)
+    if name is None:
+        return None
     try:
         found = read(scenario, library, name)
     except InvalidValue:
-        return []  # links or joints that are their own ancestors, which is told already
+        return None  # links or joints that are their own ancestors, which is told already
     provenance.tracks.update(found.tracks)
     provenance.free_tracks.update(found.free)
     provenance.log_notes.extend(found.notes)
+    problems.extend(found.problems)
+    if found.problems:
+        return None
+    provenance.sources[name] = found.excerpt
+    provenance.originals[name] = dict(found.origin)
+    return name, found
+
+
+def _read_measured(
+    library: Library,
+    text: ScenarioText,
+    root: Node,
+    scenario: Scenario,
+    recorded: tuple[str, RecordedMotion] | None,
+    problems: list[Problem],
+) -> None:
+    """Read the log of the real machine, and keep of it what the comparison needs."""
+    from replay.scenario.measured_log import MEASURED, PATH, read
+
+    provenance = scenario.provenance
+    name = _log_name(text, root, PATH, problems)
+    if name is None or scenario.measured is None:
+        return
+    same = recorded[1] if recorded is not None and recorded[0] == name else None
+    found = read(scenario, scenario.measured, library, name, provenance.problem, same)
+    provenance.log_notes.extend(found.notes)
+    problems.extend(found.problems)
     if not found.problems:
-        provenance.sources[name] = found.excerpt
-        provenance.originals[name] = dict(found.origin)
-    return found.problems
+        provenance.measured = name
+        provenance.sources[name] = found.excerpt(same)
+        provenance.originals[name] = {**found.origin, **({} if same else {"use": MEASURED})}
+
+
+def _log_name(text: ScenarioText, root: Node, path: KeyPath, problems: list[Problem]) -> str | None:
+    """Return the name in the library of the log that a part of the language names as its `file`."""
+    node = find(root, (*path, "file"))
+    assert node is not None
+    try:
+        return resolve_name(str(node.value), text.names[node.place.file])
+    except SourceRule as error:
+        problems.append(problem_at(root, (*path, "file"), str(error)))
+        return None
 
 
 def _sections_known(root: Node) -> bool:

@@ -14,6 +14,7 @@ from replay.language.units import Dimensioned, Duration, Rate
 from replay.scenario.collision import CollisionPart
 from replay.scenario.expectations import BetweenPart, Expectation, PairExpectation
 from replay.scenario.links import LinkPart
+from replay.scenario.measured import MeasuredPart
 from replay.scenario.methods import Model, builtin_model
 from replay.scenario.motion import MotionPart, MovePart, Positions
 from replay.scenario.sensors import Sensors
@@ -63,6 +64,8 @@ class Scenario(Fragment):
     """Frames per second [Hz]."""
     duration: Duration
     """Length [s]; frames are at k/rate for k = 0..floor(duration*rate)."""
+    measured: MeasuredPart | None = None
+    """A log of the real machine that the signals are compared with."""
     sweep: SweepPart | None = None
     """Cases that replace some values of this scenario."""
     _provenance: ScenarioProvenance = PrivateAttr(default_factory=ScenarioProvenance)

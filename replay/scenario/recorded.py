@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,30 +10,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from replay.errors import Problem, RecordingError, count
+from replay.errors import Problem, count
 from replay.kinematics.motion import FreeTrack, Track
 from replay.language.node import KeyPath
-from replay.language.units import ANGLE, LENGTH, TIME
-from replay.logs.csv_table import Format, is_excerpt, unit_of
-from replay.logs.exported import ENDINGS, as_csv
+from replay.language.units import ANGLE, LENGTH
+from replay.logs.csv_table import unit_of
 from replay.logs.joint_csv import read_csv
 from replay.logs.joint_log import Choice, JointLog, read_messages
-from replay.logs.message_log import MessageLog, is_message_log, open_bag_folder, open_message_log
+from replay.logs.message_log import MessageLog
 from replay.numerics.arrays import Floats
+from replay.scenario.log_file import LogFile, csv_format, open_log, reading
 from replay.scenario.names import SCALAR_JOINTS
 from replay.scenario.problems import did_you_mean
 from replay.scenario.recorded_followers import deviations, of_the_same_name
 from replay.scenario.recorded_frames import pose_track
 from replay.scenario.recorded_series import Unusable, Window, check_turns, in_window, unwrapped
 from replay.scenario.script import linkage
-from replay.scenario.source import Library, SourceRule
+from replay.scenario.source import Library
 
 if TYPE_CHECKING:
     from replay.scenario.model import Scenario
     from replay.scenario.motion import RecordedFramePart, RecordedJointPart, RecordedPart
 
 PATH = ("motion", "recorded")
-_TABLES = ("csv", "tsv")
 _OF_TABLES = ("time", "separator", "decimal")
 _OF_MESSAGES = ("topic", "channel", "frame_id", "free")
 
@@ -50,6 +48,8 @@ class RecordedMotion:
         notes: what a reader should know.
         excerpt: a file with what the scenario needs of the log.
         origin: name and SHA-256 of the file that the log is, or was cut out of.
+        published: whether the log is one of messages.
+        rows, headings: of a table, what the scenario needs of it.
     """
 
     tracks: dict[str, Track] = field(default_factory=dict)
@@ -58,6 +58,9 @@ class RecordedMotion:
     notes: list[Problem] = field(default_factory=list)
     excerpt: bytes = b""
     origin: Mapping[str, str] = field(default_factory=dict)
+    published: bool = False
+    rows: tuple[int, ...] = ()
+    headings: tuple[str, ...] = ()
 
 
 def read(scenario: Scenario, library: Library, name: str) -> RecordedMotion:
@@ -111,61 +114,28 @@ class _MotionReader:
             self._note((*PATH, "file"), rule)
         if not found.problems:
             found.origin = dict(log.origin) or {"name": self._name, "sha256": digest}
-            found.excerpt = log.cut(sorted({*log.anchor, *self._rows}), found.origin)
+            found.published, found.headings = log.published, log.headings
+            found.rows = tuple(sorted({*log.anchor, *self._rows}))
+            found.excerpt = log.cut(found.rows, found.origin)
         return found
 
     def _read(self) -> tuple[JointLog, str]:
         """Return the log and the SHA-256 of its file, or of the list of files of its folder."""
-        written, shown = self._written, self._library.shown(self._name)
-        try:
-            data = self._library.read(self._name)
-        except SourceRule as error:
-            return self._read_folder(shown, error)
-        digest = hashlib.sha256(data).hexdigest()
-        kind = self._name.rpartition(".")[2].lower()
-        messages = is_message_log(data) or kind in ("mcap", "bag", "db3")
-        if not messages and kind not in (*_TABLES, *ENDINGS):
-            raise Unusable(
-                (*PATH, "file"), "is neither a .mcap nor a .csv file, nor a ROS bag (.bag, .db3, its folder)"
-            )
-        for option in _OF_TABLES if messages else _OF_MESSAGES:
-            if getattr(written, option) not in (None, {}):
-                more = ", whose messages carry their times" if option == "time" else ""
-                raise Unusable((*PATH, option), f"has no effect with a .{kind} file{more}")
-        try:
-            if messages:
-                return self._of_messages(shown, open_message_log(shown, data)), digest
-            if kind in ENDINGS and not is_excerpt(data):
-                data = as_csv(shown, data)
-            units = {unit: factor * 10**9 for unit, factor in TIME.units.items()}
-            time = (written.time.column, written.time.unit) if written.time else (None, None)
-            format = Format(*time, units, written.separator, written.decimal)
-            needed = {joint.name for joint in written.joints.values()} | self._linkage.followers.keys()
-            needed = needed if written.joints else set(self._scalar_joints())
-            return read_csv(shown, data, format, needed, self._max_gap), digest
-        except RecordingError as error:
-            raise Unusable((*PATH, "file"), error.reason) from None
+        written = self._written
+        of_tables = {option: getattr(written, option) for option in _OF_TABLES}
+        of_messages = {option: getattr(written, option) for option in _OF_MESSAGES}
+        file = open_log(self._library, self._name, PATH, of_tables=of_tables, of_messages=of_messages)
+        with reading(PATH):
+            return self._joint_log(file), file.sha256
 
-    def _read_folder(self, shown: str, error: SourceRule) -> tuple[JointLog, str]:
-        def read(file: str) -> bytes:
-            try:
-                return self._library.read(f"{self._name}/{file}")
-            except SourceRule as wrong:
-                raise RecordingError(shown, f"names the file {file!r}, which {wrong}") from None
-
-        try:
-            self._library.read(f"{self._name}/metadata.yaml")
-        except SourceRule:
-            raise Unusable((*PATH, "file"), str(error)) from None
-        for option in _OF_TABLES:
-            if getattr(self._written, option) is not None:
-                raise Unusable((*PATH, option), "has no effect with a bag, whose messages carry their times")
-        try:
-            log, files = open_bag_folder(shown, read)
-            listed = "".join(f"{hashlib.sha256(data).hexdigest()}  {file}\n" for file, data in sorted(files.items()))
-            return self._of_messages(shown, log), hashlib.sha256(listed.encode()).hexdigest()
-        except RecordingError as wrong:
-            raise Unusable((*PATH, "file"), wrong.reason) from None
+    def _joint_log(self, file: LogFile) -> JointLog:
+        written = self._written
+        if file.messages is not None:
+            return self._of_messages(file.shown, file.messages)
+        format = csv_format(written.time, written.separator, written.decimal)
+        needed = {joint.name for joint in written.joints.values()} | self._linkage.followers.keys()
+        needed = needed if written.joints else set(self._scalar_joints())
+        return read_csv(file.shown, file.table, format, needed, self._max_gap)
 
     def _of_messages(self, shown: str, log: MessageLog) -> JointLog:
         written = self._written

@@ -56,7 +56,9 @@ class ScenarioProvenance:
         meshes: name of the mesh file of each mesh shape, by (link, shape).
         tracks: recorded motion by joint, read from a log, of which an excerpt is among the sources.
         free_tracks: recorded poses by free joint.
-        originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name.
+        measured: name of the log of the real machine among the sources; "" for none.
+        originals: name and SHA-256 of the file that an excerpt among the sources was cut out of, by the source's name;
+            and its `use`, of one that no reading depends on.
         log_notes: what a reader should know of the log although it is read.
         root: the text's tree, includes merged.
     """
@@ -66,6 +68,7 @@ class ScenarioProvenance:
     meshes: dict[tuple[str, str], str] = field(default_factory=dict)
     tracks: dict[str, Track] = field(default_factory=dict, compare=False)
     free_tracks: dict[str, FreeTrack] = field(default_factory=dict, compare=False)
+    measured: str = ""
     originals: dict[str, dict[str, str]] = field(default_factory=dict)
     log_notes: list[Problem] = field(default_factory=list, compare=False)
     root: Node | None = field(default=None, compare=False)

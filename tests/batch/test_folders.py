@@ -5,8 +5,12 @@ import unicodedata
 
 import pytest
 
+from replay.batch.baseline import LOG
 from replay.batch.folders import look_through
+from replay.batch.judged import REPORTS
+from replay.batch.reports import HISTORY
 from replay.batch.select import Selection, find_scenarios, left_out, load_all
+from replay.comparison.run_folder import RUN
 from replay.errors import InvalidValue, ScenarioError
 
 SCENARIO = "version: 1\nname: {name}\nrate: 10\nduration: 1\nlinks: {{box: {{}}}}\n"
@@ -106,3 +110,14 @@ def test_of_a_file_that_is_too_large_for_yaml_no_more_is_read(tmp_path):
     selection = Selection.of([tmp_path], (), None)
     assert [scenario.name for scenario in selection.chosen] == ["a"]
     assert "at most 1073741824 are read" in str(selection.failed[0].error)
+
+
+@pytest.mark.parametrize("name", [RUN, *REPORTS, HISTORY, LOG, "Run.JSON"])
+def test_a_scenario_is_not_called_as_a_file_that_stands_beside_its_folder(tmp_path, name):
+    write(tmp_path / "a.yaml", "a")
+    write(tmp_path / "b.yaml", name)
+    selection = Selection.of([tmp_path], (), None)
+    assert [scenario.name for scenario in selection.chosen] == ["a"]
+    (result,) = selection.failed
+    assert result.name == "b"
+    assert "is the name of a file that stands beside the folders of scenarios" in result.error

@@ -32,7 +32,7 @@ def test_the_page_of_ten_thousand_is_small_and_so_is_the_summary(large):
     assert "and 81 more groups" in text and "and 9980 more scenarios" in text
 
 
-def test_ten_thousand_rows_are_searched_and_shown_a_hundred_at_a_time(large):
+def test_ten_thousand_rows_are_searched_and_shown_a_part_at_a_time(large):
     folder, _, _ = large
     chromium = shutil.which("chromium")
     assert chromium, "this test needs a browser (Debian: apt-get install chromium)"
@@ -44,16 +44,16 @@ def test_ten_thousand_rows_are_searched_and_shown_a_hundred_at_a_time(large):
         page.goto((folder / "index.html").as_uri())
         ready = page.wait_for_selector("html[data-ready]", state="attached").get_attribute("data-ready")
         print(f"opened in {ready} ms, {json.dumps(page.evaluate('performance.getEntriesByType(`navigation`)[0]'))}")
-        assert page.locator(".scenario").count() == 100
-        assert page.locator("#status").inner_text() == "10000 of 10000 scenarios, 100 shown"
+        assert page.locator(".scenario").count() == 30
+        assert page.locator("#status").inner_text() == "10000 of 10000 scenarios, 30 shown"
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         page.locator(".scenario").last.scroll_into_view_if_needed()
         page.locator("#more").scroll_into_view_if_needed()
-        page.wait_for_function("document.querySelectorAll('.scenario').length >= 200")
+        page.wait_for_function("document.querySelectorAll('.scenario').length >= 130")
         page.locator("#search").fill("arm=120deg person=3")
         assert page.locator("#status").inner_text().startswith("7 of 10000")
         page.locator("#search").fill("")
         page.locator("#group").select_option("0")
-        assert page.locator("#status").inner_text() == "99 of 10000 scenarios"
+        assert page.locator("#status").inner_text() == "99 of 10000 scenarios, 30 shown"
         browser.close()
     assert errors == []

@@ -62,6 +62,37 @@ def test_a_baseline_with_a_link_in_it_is_refused(ran, capsys, place, target):
     assert listing(ran) == before
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes as POSIX has them")
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (".staging", "base/.staging: cannot be written: File exists"),
+        ("objects", "base/objects is a file where a folder is needed"),
+        ("a", "base/a: cannot be written: File exists"),
+        ("accepted.jsonl", "base/accepted.jsonl: cannot be written: it is a pipe or a device"),
+    ],
+)
+def test_a_pipe_in_a_baseline_is_not_waited_for(ran, capsys, place, words):
+    (ran / "base").mkdir()
+    os.mkfifo(ran / "base" / place)
+    assert accept(ran) is ExitCode.INVALID
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes as POSIX has them")
+def test_a_night_waits_for_no_pipe(tmp_path, capsys):
+    places = [".lock", ".rrd", "run.json", "index.html", "junit.xml", "summary.md", "metrics.parquet"]
+    places += ["a/log.txt", "a/result.json", "a/a.mcap", "a/a.mcap.part", "a/a.rrd", "a/report.html"]
+    scenes.write(tmp_path / "in", "a", duration=0.2, contact="always")
+    (tmp_path / "out" / "a").mkdir(parents=True)
+    for place in places:
+        os.mkfifo(tmp_path / "out" / place)
+    command = ["regress", str(tmp_path / "in"), "--baseline", str(tmp_path / "base"), "-o", str(tmp_path / "out")]
+    assert run([*command, "--workers", "1"]) is ExitCode.FAILED
+    assert "a: broken" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["verdicts"]["a"]["verdict"] == "broken"
+
+
 def test_a_baseline_folder_may_be_a_link_that_the_user_names(ran):
     """It is where the user says; but nothing that was there before is removed."""
     before = listing(ran / "victim")

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
@@ -19,6 +20,7 @@ SETPRIV = shutil.which("setpriv")
 AS_ANYBODY = [SETPRIV, f"--bounding-set={CAPABILITIES}", f"--inh-caps={CAPABILITIES}"] if os.geteuid() == 0 else []
 """What takes the right from root to look into any folder."""
 NAMES = ("a", "b", "c")
+BALL = "  ball: {pose: {xyz: [0, 3, 0]}, shapes: {ball: {type: mesh, file: ball.stl, scale: 1}}}\n"
 MANY = """
 import json, sys
 from replay.cli.main import run
@@ -41,10 +43,14 @@ def night(tmp_path_factory):
     folder = tmp_path_factory.mktemp("night")
     for name in NAMES:
         scenes.write(folder / "in", name, duration=0.2)
+    first = folder / "in" / "a.yaml"
+    first.write_text(first.read_text().replace("links:\n", f"links:\n{BALL}"))
+    (folder / "in" / "ball.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
     more = ["--workers", "1", "--rrd", "none", "--missing-baseline", "create"]
     assert (
         run(["regress", str(folder / "in"), "--baseline", str(folder / "base"), "-o", str(folder / "out"), *more]) == 0
     )
+    shutil.copytree(folder / "out", folder / "part")
     return folder
 
 
@@ -95,6 +101,52 @@ def test_nobody_says_of_a_locked_baseline_that_it_is_not_there(night, locked):
     done = anybody(night, "-m", "replay", "diff", "base", "out")
     assert done.returncode == ExitCode.INVALID
     assert done.stderr == "replay: error: base/a: cannot be looked through: Permission denied\n"
+
+
+@pytest.mark.parametrize("mode", [0o000, 0o444])
+def test_meshes_that_may_not_be_looked_at_are_one_line_each(mode, night, locked):
+    locked("base/objects")
+    (night / "base" / "objects").chmod(mode)
+    arguments = [
+        ["validate", "base/a/a.mcap"],
+        ["run", "base/a/a.mcap", "-o", "never"],
+        ["explain", "base/a/a.mcap", "/distance/tip", "--at", "0"],
+    ]
+    told = anybody(night, "-c", MANY, json.dumps(arguments)).stderr.splitlines()
+    assert told[1::2] == ["2"] * len(arguments)
+    assert all(
+        "base/objects/" in line and line.endswith("'ball.stl' cannot be read: Permission denied") for line in told[::2]
+    )
+
+
+def test_meshes_further_up_are_found_behind_a_folder_that_may_not_be_looked_into(night, locked):
+    (night / "base" / "a" / "objects").mkdir()
+    locked("base/a/objects")
+    done = anybody(night, "-m", "replay", "validate", "base/a/a.mcap")
+    assert (done.stdout, done.returncode) == ("a: valid, 3 frames, 3 links\n", ExitCode.FINE)
+
+
+@pytest.mark.parametrize("place", ["part/a", "part/run.json"])
+def test_parts_of_a_night_that_may_not_be_looked_into_are_neither_merged_nor_accepted(place, night, locked):
+    locked(place)
+    arguments = [["merge", "part", "-o", "whole"], ["accept", "part", "--baseline", "base", "--yes", "--reason", "why"]]
+    told = anybody(night, "-c", MANY, json.dumps(arguments)).stderr.splitlines()
+    shutil.rmtree(night / "whole", ignore_errors=True)
+    assert told[1::2] == ["2"] * len(arguments)
+    assert all(line.startswith("replay: error: ") and line.endswith("Permission denied") for line in told[::2])
+
+
+def test_an_acceptance_names_the_place_that_it_may_not_write(night, locked):
+    text = (night / "in" / "a.yaml").read_text()
+    (night / "new").mkdir()
+    (night / "new" / "ball.stl").write_bytes(trimesh.creation.box((2, 2, 2)).export(file_type="stl"))
+    (night / "new" / "a.yaml").write_text(text)
+    run(["run", str(night / "new"), "-o", str(night / "ran"), "--workers", "1", "--no-rrd"])
+    locked("base/objects")
+    done = anybody(night, "-m", "replay", "accept", "ran", "--baseline", "base", "--yes", "--reason", "why")
+    assert done.returncode == ExitCode.INVALID
+    assert done.stderr.startswith("replay: error: base/objects")
+    assert done.stderr.endswith(": cannot be written: Permission denied\n")
 
 
 def test_a_link_into_a_locked_folder_hides_no_scenario(night, locked):

@@ -1,6 +1,7 @@
 """Numbers of nights: kept, read again, told as tables, sparklines and a page."""
 
 import json
+import re
 
 import pyarrow.parquet as pq
 import pytest
@@ -24,6 +25,7 @@ from tests.cli.nights import night
         ([0.5, 0.5, 0.5 + 1e-9], "▄▄▄"),
         ([0.0, 0.0], "▄▄"),
         ([-1.0, 1.0], "▁█"),
+        ([1.7e308, -1.7e308], "█▁"),
     ],
 )
 def test_sparklines(values, bars):
@@ -99,3 +101,12 @@ def test_results_are_the_same_in_result_json_parquet_and_history(tmp_path):
     assert json.loads(line)["results"]["clearance.min"]["a"] == 0.0
     assert night(tmp_path, out, "--resume", "--rrd", "none") is ExitCode.FAILED
     assert pq.read_table(out / "metrics.parquet").to_pylist() == rows
+
+
+def test_numbers_at_the_end_of_what_numbers_are_have_a_curve_and_what_is_none_is_left_out(tmp_path, capsys):
+    path, html = written(tmp_path / "h.jsonl"), tmp_path / "t.html"
+    line = path.read_text().splitlines()[0]
+    path.write_text("\n".join(line.replace("0.021", number) for number in ("1.7e308", "-1.7e308", "1e999", "NaN")))
+    assert run(["trend", "--history", str(path), "--html", str(html)]) is ExitCode.FINE
+    assert "last 2 of 2 nights" in capsys.readouterr().out
+    assert not re.search(r"\b(nan|inf)\b", html.read_text())

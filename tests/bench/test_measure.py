@@ -8,7 +8,7 @@ import pytest
 
 from replay.bench import goals, results
 from replay.bench.goals import PROMISES, Goal, advantage
-from replay.bench.measure import Check, Contender, absent, compete, exponent
+from replay.bench.measure import Check, Contender, Row, absent, compete, exponent
 from replay.bench.report import Grid, LogLogPlot, Report, pareto_front, pareto_plot
 
 
@@ -31,6 +31,19 @@ def test_a_wrong_contender_is_reported_as_failed_never_as_fast():
     report = Report("test", tables={"table": rows}, plots=[pareto_plot("plot", rows, "error")])
     assert "FAILED: wrong answers" in report.as_text()
     assert list(report.plots[0].lines) == ["slow"]
+
+
+def test_a_method_that_missed_something_is_crossed_where_it_stands():
+    def row(method, seconds, error, missed=0, **more):
+        return Row(
+            "case", method, seconds, seconds, seconds, 1, error, 0, 10, missed=missed, **{"failed": False, **more}
+        )
+
+    rows = [row("rays", 1.0, 1e-2, missed=3), row("rays", 4.0, 1e-3), row("exact", 2.0, 1e-12)]
+    rows += [row("broken", 3.0, 1e-1, missed=1, failed=True)]
+    plot = pareto_plot("plot", rows, "error", {"exact": "ours"})
+    assert plot.lines == {"rays": [(1.0, 1e-2), (4.0, 1e-3)], "ours": [(2.0, 1e-12)]}
+    assert plot.crossed == [(1.0, 1e-2)]
 
 
 def test_an_error_that_is_no_number_fails():

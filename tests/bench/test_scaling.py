@@ -50,6 +50,14 @@ def test_set_up_is_timed_for_each_body():
     assert all(row.median > 0.0 for row in rows) and len(report.notes) == 3
 
 
+def test_of_the_times_of_set_up_the_least_the_middle_and_the_largest_are_told(monkeypatch):
+    report, times = Report("scaling"), iter([9.0, 3.0, 1.0, 2.0] * 3)
+    monkeypatch.setattr(set_up, "_seconds", lambda triangles: next(times))  # the first one of a body is not told
+    set_up.growth(report, sizes=(300,), rounds=3)
+    (rows,) = report.tables.values()
+    assert [(row.low, row.median, row.high, row.rounds) for row in rows] == [(1.0, 2.0, 3.0, 3)] * 3
+
+
 def test_growth_needs_two_sizes():
     report = Report("scaling")
     broad_phase.growth(report, most=30, rounds=1)

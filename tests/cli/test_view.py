@@ -10,6 +10,7 @@ import pytest
 import rerun as rr
 
 from replay.cli.exit_codes import ExitCode
+from replay.cli.main import run
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
@@ -48,3 +49,29 @@ def test_the_viewer_does_not_outlive_the_command(tmp_path):
     assert not Path(environment["XDG_CONFIG_HOME"]).exists(), "the viewer's home goes with it"
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--at", "1"], "--at belongs to --screenshot"),
+        (["--scene-only"], "--scene-only belongs to --screenshot"),
+        (["--screenshot", "a.png", "--at", "-0.001"], "--at -0.001 is no moment of a recording"),
+        (["--screenshot", "a.png", "--at", "inf"], "--at inf is no moment of a recording"),
+        (["--screenshot", "a.png", "--at", "nan"], "--at nan is no moment of a recording"),
+        (["--screenshot", "a.jpg"], "--screenshot a.jpg must end in .png"),
+        (["--screenshot", "a.png", "--web"], "--screenshot and --web exclude each other"),
+        (["--screenshot", "a.png", "--scene-only", "no.rrd"], "--camera and --scene-only are for one recording"),
+        # what may be said: then the recording is looked for
+        (["--screenshot", "a.PNG", "--at", "0"], "no.rrd"),
+        (["--screenshot", "a.png", "--at", "1e9", "--scene-only"], "no.rrd"),
+        (["--web"], "no.rrd"),
+        ([], "no.rrd"),
+    ],
+)
+def test_options_that_do_not_go_together_are_told_before_anything_is_read(
+    tmp_path, monkeypatch, capsys, options, message
+):
+    monkeypatch.chdir(tmp_path)
+    assert run(["view", "no.rrd", *options]) is ExitCode.INVALID
+    assert message in capsys.readouterr().err

@@ -127,3 +127,28 @@ def test_a_free_body_that_slides_and_spins_above_a_plane_takes_few_queries(gap):
     columns, counters = look(links, solids, Script(free={"f": keys}), frames=3, rate=2.0)
     assert columns.between[1:, 0].tolist() == [Between.CLEAR] * 2
     assert counters.moments <= 20
+
+
+@pytest.mark.parametrize("turn", [0.0, 3.0])
+@pytest.mark.parametrize("gap", GAPS)
+def test_the_way_of_a_free_body_lies_in_its_joints_place_however_that_is_turned(gap, turn):
+    """The place is turned about no axis of its own, so each of its nine numbers counts; the way is along the world's x.
+
+    A cube spins about z just above a plane, then just so deep that it touches: as in a place that is not turned.
+    """
+    axis = np.array([1.0, -2.0, 3.0]) / math.sqrt(14.0)
+    place = transforms.from_axis_angle(axis, np.array(0.7))
+    for height, expected in ((gap, Between.CLEAR), (-gap, Between.CONTACT)):
+        keys = []
+        for time, x, angle in ((0.0, -0.5, 0.0), (1.0, 0.5, turn)):
+            pose = transforms.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(angle))
+            pose[:3, 3] = x, 0.2 * x, 0.05 + height
+            inside = transforms.compose(transforms.invert(place), pose)
+            keys.append(Keyframe(time, tuple(inside[:3, 3]), tuple(transforms.to_quaternion(inside))))
+        links = [Link("top", None, place, Joint("f", JointType.FREE)), WALL]
+        solids = {"top": cube(0.1), "wall": cuboid((0.2, 4.0, 0.1)).transformed(at(0.0, 0.0, -0.05))}
+        columns, counters = look(links, solids, Script(free={"f": tuple(keys)}))
+        assert columns.between[1, 0] == expected
+        if expected == Between.CLEAR:
+            assert gap * (1.0 - 1e-3) - 1e-15 <= columns.clearance_bound[1, 0] <= gap * (1.0 + 1e-6)
+            assert counters.moments <= 12

@@ -8,7 +8,11 @@ from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 from replay.collision import gjk
 from replay.collision.closest_triangles import closest_triangles
+from replay.logs.mcap_records import Op
+from replay.recording.provenance import sha256
+from replay.recording.slim import attached_files
 from tests.batch import scenes
+from tests.fuzz import damage
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +73,32 @@ def test_what_is_not_there_is_told(recorded, capsys):
     ]:
         assert run(["explain", str(recorded), signal, "--at", at]) is ExitCode.INVALID
         assert message in capsys.readouterr().err
+
+
+def with_scenario(recording, name, text):
+    """A recording with another text attached, and the digest of that stated."""
+    records, summary = damage.parse(recording.read_bytes())
+    (before,) = (content for op, content in records if op == Op.ATTACHMENT and damage.text(name) in content)
+    old = attached_files(recording)[2][name]
+    assert before.count(old) == 1 and len(text) == len(old)
+    records = [(op, before.replace(old, text) if content is before else content) for op, content in records]
+    for k, (op, content) in enumerate(records):
+        if op == Op.METADATA:
+            records[k] = op, content.replace(sha256(old).encode(), sha256(text).encode())
+    return damage.build(records, summary)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("{eye: {link", "{ear: {link"), ("guest", "ghost"), ("ball:", "bull:"), ("slide", "glide"), ("guard:", "guide:")],
+)
+def test_a_recording_that_holds_another_scenario_is_refused(recorded, tmp_path, capsys, old, new):
+    text = scenes.MESHES.encode()
+    path = tmp_path / "other.mcap"
+    path.write_bytes(with_scenario(recorded, "meshes.yaml", text.replace(old.encode(), new.encode())))
+    for signal in ("/distance/eye", "/capacitive/guard", "/collision/ring/body|slide/ball"):
+        assert run(["explain", str(path), signal, "--at", "1"]) is ExitCode.INVALID
+        assert "other.mcap: holds another scenario than it was made of" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -7,7 +7,7 @@ import pytest
 from replay.comparison.difference import DiffVerdict
 from replay.comparison.rules import Rule, Rules, Tolerance
 from replay.comparison.rules_file import read_rules
-from replay.comparison.runs import Case, RecordingPair, RunDifference, diff_pair
+from replay.comparison.runs import Case, RecordingPair, RunDifference, Unreadable, diff_pair
 from replay.comparison.suggest import MARK, round_up, suggest
 from tests.comparison import made_up
 from tests.comparison.changed import BASELINE, change, compared
@@ -49,6 +49,18 @@ def test_suggested_rules_pass_and_no_tighter_ones_do(tmp_path):
         assert diff_pair(pair, rules=Rules(tuple(others))).verdict is DiffVerdict.DIFFERENT
 
 
+def test_what_a_present_rule_says_of_nan_and_zero_is_kept():
+    def calm(recording):
+        recording.joint_positions[20, 0] += 1e-3
+
+    rule = Rule(("/joint_states/position/lift",), Tolerance(abs=1e-9, nan="fail", zero="signed"), "as it is")
+    pair = RecordingPair(BASELINE, made_up.altered(BASELINE, calm))
+    for rules, kept in ((Rules((rule,)), ["nan: fail", "zero: signed"]), (None, [])):
+        found = RunDifference("a", "b", (Case("made_up", Path("a"), Path("b"), diff_pair(pair, rules=rules)),))
+        lines = [line.strip() for line in suggest(found).splitlines()]
+        assert [line for line in lines if line.startswith(("nan:", "zero:"))] == kept
+
+
 def test_what_no_tolerance_accepts_is_a_comment(tmp_path):
     found, _ = compared()
     path = tmp_path / "rules.yaml"
@@ -67,3 +79,21 @@ def test_frames_that_only_one_run_has_are_a_comment_unless_a_rule_accepts_them(a
     lines = [line for line in suggest(found).splitlines() if "missing in the candidate" in line]
     assert len(lines) == (0 if accepted else 1)
     assert all(line.startswith('#   "made_up: 2 frames missing') for line in lines)
+
+
+def test_what_cannot_be_compared_is_a_comment():
+    """A scenario that nobody could read, and those of one run only, but for such as rules leave out."""
+    found = RunDifference(
+        "a",
+        "b",
+        (),
+        missing=("gone", "left"),
+        extra=("new",),
+        unreadable=(Unreadable("cut", Path("a"), Path("b"), "b/cut/cut.mcap: damaged: its end is missing"),),
+        ignored=("left",),
+    )
+    assert [line for line in suggest(found).splitlines() if line.startswith("#   ")] == [
+        '#   "scenario cut: b/cut/cut.mcap: damaged: its end is missing"',
+        '#   "scenario gone: in one run only"',
+        '#   "scenario new: in one run only"',
+    ]

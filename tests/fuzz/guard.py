@@ -28,7 +28,7 @@ _OWN = tuple(
     os.path.realpath(place) + "/"
     for place in (
         tempfile.gettempdir(),
-        *("/dev/null", "/proc/self", "/sys", "/usr/share", "/etc/mime.types"),
+        *("/dev/null", "/proc/self", "/proc/meminfo", "/sys", "/usr/share", "/etc/mime.types"),
         *(Path(replay.__file__).parents[1], *site.getsitepackages()),
         *sysconfig.get_paths().values(),
         *(sys.prefix, sys.base_prefix),

@@ -30,6 +30,8 @@ WHOLE = {
     "text.stl": exported("stl_ascii"),
     "binary.stl": exported("stl"),
     "called solid.stl": b"solid" + exported("stl")[5:],
+    "padded to blocks.stl": exported("stl").ljust(1024, b"\0"),
+    "with a line after it.stl": exported("stl") + b"COLOR=red",
     "text.ply": exported("ply", encoding="ascii"),
     "binary.ply": exported("ply"),
     "box.obj": exported("obj"),
@@ -82,7 +84,8 @@ def test_cut_files_are_refused_or_keep_their_triangles(name):
         ("words.stl", b"hello\nworld\n" * 9, "its header announces .* triangles"),
         ("short.stl", b"hello", "its header is cut; the file has 5 bytes"),
         ("cut.stl", exported("stl")[:-7], "announces 12 triangles, which need 684 bytes; the file has 677"),
-        ("long.stl", exported("stl") + b"more", "need 684 bytes; the file has 688"),
+        ("long.stl", exported("stl") + exported("stl")[-50:], "need 684 bytes; the file has 734"),
+        ("none.stl", bytes(684), "announces 0 triangles, which need 84 bytes"),
         (
             "cut text.stl",
             exported("stl_ascii")[:-40],

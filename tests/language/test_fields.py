@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from replay.language.fields import Axis, Part, Placement, Quaternion, in_order, needs_one
+from replay.language.fields import Axis, Name, Part, Placement, Quaternion, in_order, needs_one
 from replay.numerics import transforms
 
 
@@ -73,3 +73,12 @@ def test_an_expectation_says_something_and_its_bounds_leave_something():
         in_order(low, high, "m")
     with pytest.raises(Exception, match=r"must not be below min, 2 m"):
         in_order(2.0, 1.9, "m")
+
+
+def test_a_name_has_a_hundred_characters_at_most():
+    adapter = TypeAdapter(Name)
+    assert adapter.validate_python("a" * 100) == "a" * 100
+    for name in ("a" * 101, "", ".a", "-a", "a b", "a/b", "ü", "a\n"):
+        with pytest.raises(ValidationError):
+            adapter.validate_python(name)
+    assert [adapter.validate_python(name) for name in ("_", "7", "a.b-c_D")] == ["_", "7", "a.b-c_D"]

@@ -104,6 +104,13 @@ def test_a_joint_position_keeps_its_dimension_until_the_joint_is_known():
     assert parse("30 deg").dimension.name == "an angle"
     assert parse("5 cm").dimension.name == "a length"
     assert parse(0.5).dimension is None
+    for value, rule in (
+        (-math.inf, "is not finite"),
+        ("1e400 m", "is too large for a number"),
+        (1e13, "must be between"),
+    ):
+        with pytest.raises(ValidationError, match=rule):
+            parse(value)
     with pytest.raises(ValidationError, match="is a time where an angle or a length belongs"):
         parse("5 s")
 
@@ -157,3 +164,11 @@ def test_a_quantity_takes_its_bounds_and_nothing_beyond(name, least, most, open_
             adapter.validate_python(math.inf)
     with pytest.raises(ValidationError):
         adapter.validate_python(math.nan)
+
+
+def test_a_quantity_has_four_hundred_characters_at_most():
+    parse = TypeAdapter(Length).validate_python
+    longest = "1." + "0" * 396 + " m"
+    assert len(longest) == 400 and parse(longest) == 1.0
+    with pytest.raises(ValidationError, match="is not a length"):
+        parse(longest.replace(" ", "  "))

@@ -106,3 +106,17 @@ def test_times_are_read_up_to_146_years(time, works):
 )
 def test_first_stamps_are_no_times_when_the_clock_was_not_there_yet(stamps, zeros):
     assert leading_zeros(stamps, 10) == zeros
+
+
+@pytest.mark.parametrize(
+    ("encoding", "language", "told"),
+    [
+        ("protobuf", "protobuf", "holds a.B as protobuf with a schema in protobuf; read are"),
+        ("cdr", "ros2msg", "holds a.B as cdr with a schema in ros2msg; read are"),
+        ("", "", "holds a.B as bytes; read are"),
+    ],
+)
+def test_messages_of_another_kind_are_told_with_how_they_are_written(encoding, language, told):
+    data = made_logs.mcap_of([(0, 10, b"")], encoding, "a.B", language, b"")
+    with pytest.raises(RecordingError, match=told):
+        read_messages("log.mcap", open_message_log("log.mcap", data), Choice())

@@ -62,6 +62,25 @@ def test_times_of_chunks_and_of_the_whole_are_those_of_their_messages(as_rows: b
     assert (counts, told.attachment_count, told.metadata_count) == ((9, 3, 3, 1), 1, 2)
 
 
+def test_who_reads_from_the_beginning_knows_schemas_and_channels_before_they_are_needed() -> None:
+    """Without the summary, as of a file that was cut; each stands there once more, in the summary."""
+    known: dict[type, list[Any]] = {}
+    for record in StreamReader(io.BytesIO(written(as_rows=True)), emit_chunks=True).records:
+        if isinstance(record, mcap.records.Chunk) and not known.get(mcap.records.Chunk):
+            schemas, channels = known[mcap.records.Schema], known[mcap.records.Channel]
+            assert [(one.id, one.name, one.encoding, one.data) for one in schemas] == [
+                (1, "made.Up", "protobuf", b"schema")
+            ]
+            assert [(one.id, one.topic, one.schema_id) for one in channels] == [
+                (1, "/1", 1),
+                (2, "/2", 1),
+                (3, "/3", 1),
+            ]
+            assert len(known[mcap.records.Metadata]) == 2 and len(known[mcap.records.Attachment]) == 1
+        known.setdefault(type(record), []).append(record)
+    assert len(known[mcap.records.Schema]) == 2 and len(known[mcap.records.Channel]) == 6
+
+
 def record_at(data: bytes, offset: int) -> Any:
     return next(StreamReader(io.BytesIO(data[offset:]), skip_magic=True, emit_chunks=True).records)
 

@@ -1,10 +1,15 @@
 """Bags and folders of bags as logs of messages: what is damaged is told, in one line, and never a crash."""
 
+import io
+import itertools
+
 import numpy as np
 import pytest
 
 from replay.errors import RecordingError
 from replay.logs.joint_log import Choice, read_messages
+from replay.logs.mcap_records import Schema
+from replay.logs.mcap_writer import McapFileWriter
 from replay.logs.message_log import open_bag_folder, open_message_log
 from tests.logs import made_logs
 from tests.logs.made_logs import Said
@@ -74,6 +79,29 @@ def test_channels_that_have_another_id_in_the_next_file_are_the_same():
     log, _ = open_bag_folder("drive", {"metadata.yaml": LISTED, "a": parts[0], "b": camera, "c": parts[1]}.__getitem__)
     assert sorted(channel.topic for channel in log.channels.values()) == ["/camera", "/joint_states"]
     assert positions(log) == TRUTH
+
+
+@pytest.mark.parametrize("number", [0, 1, 7])
+def test_a_topic_without_a_schema_has_none_in_a_split_bag_either(number):
+    """Whatever numbers channels have, it must get no other topic's schema."""
+
+    def part(time, schema=None):
+        stream = io.BytesIO()
+        writer = McapFileWriter(stream, "made")
+        known = writer.schema(schema) if schema else 0
+        writer.channel("/typed" if schema else "/note", known, encoding="json", number=number)
+        writer.end_preamble()
+        writer.messages(number, [time], [0], [b'{"a": 1}'])
+        writer.finish()
+        return stream.getvalue()
+
+    schema = Schema("Any", "jsonschema", b"{}")
+    for parts in itertools.permutations((part(1), part(2), part(3, schema))):
+        files = {"metadata.yaml": LISTED, **dict(zip("abc", parts, strict=True))}
+        log, _ = open_bag_folder("drive", files.__getitem__)
+        assert len(log.channels) == 2
+        schemas = {channel.topic: log.schema(channel) for channel in log.channels.values()}
+        assert schemas == {"/typed": schema, "/note": None}
 
 
 LISTED = b"rosbag2_bagfile_information:\n  relative_file_paths: [a, ../drive/b, c]\n"

@@ -38,6 +38,7 @@ ARITHMETIC: dict[type[ast.operator], tuple[str, str]] = {
     ast.RShift: (">>", "<<"),
 }
 OPPOSITES = {"min": "max", "max": "min", "any": "all", "all": "any", "minimum": "maximum", "maximum": "minimum"}
+_NO_CODE = (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop)
 DECORATORS = {"kernel", "leaf_kernel", "inlined_kernel", "entry"}
 """What makes a function one that is compiled (`replay.numerics.jit`)."""
 
@@ -138,7 +139,8 @@ class _Finder:
 
     def _body(self, node: ast.AST) -> None:
         for child in ast.iter_child_nodes(node):
-            self._node(child, node)
+            if not isinstance(child, _NO_CODE):
+                self._node(child, node)
 
     def _node(self, node: ast.AST, parent: ast.AST) -> None:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
@@ -156,7 +158,12 @@ class _Finder:
             return
         if isinstance(node, ast.Import | ast.ImportFrom | ast.Assert | ast.JoinedStr):
             return
-        if isinstance(parent, ast.Call) and ast.unparse(parent.func).endswith("reshape") and ast.unparse(node) == "-1":
+        if (
+            isinstance(node, ast.UnaryOp)
+            and isinstance(parent, ast.Call)
+            and ast.unparse(parent.func).endswith("reshape")
+            and ast.unparse(node) == "-1"
+        ):
             return  # any other negative number would be the same there
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
             return

@@ -20,12 +20,15 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from tests.mutants.mutations import Mutation, has_kernels, is_python, mutations_of
+from tests.mutants.reach import Reach
 from tests.mutants.targets import Targets
 from tests.mutants.trial import Outcome, Tree, preload
 
 HERE = Path(__file__).parent
 CHECKOUT = HERE.parents[1]
-GUESS = 5.0  # seconds that a test file takes of which nothing is known yet
+MOST = 150  # tests that are asked about one mutant
+EACH = 6.0  # seconds that a test may take with kernels as plain Python
+COMPILING = 240.0  # seconds to compile what calls a kernel
 WANTED = 0.95  # share of the mutants that tests must notice
 
 
@@ -94,94 +97,87 @@ def chosen(root: Path, count: int, seed: int, rooms: Sequence[str]) -> tuple[lis
     return result, left_out
 
 
-class Experience:
-    """What earlier trials have told of the tests, kept in a file: how long each file takes, and which tests are sound.
-
-    A test is sound when it passes without a fault: only then does its failing say anything.
-    """
-
-    def __init__(self, tree: Tree, targets: Targets, file: Path) -> None:
-        self._tree = tree
-        self._file = file
-        self._tests = targets.tests
-        known = json.loads(file.read_text()) if file.exists() else {}
-        self._seconds: dict[str, dict[str, float]] = known.get("seconds", {"compiled": {}, "plain": {}})
-        self._sound: dict[str, bool] = known.get("sound", {})
-
-    def seconds(self, how: str) -> dict[str, float]:
-        """Return the seconds of the test files that can be asked, with compiled or with plain kernels."""
-        known = self._seconds[how]
-        return {test: known.get(test, GUESS) for test in self._tests if known.get(test, GUESS) < math.inf}
-
-    def learn(self, outcome: Outcome, how: str) -> None:
-        """Take the times of a trial that passed."""
-        self._seconds[how].update(outcome.by_file)
-        self._keep()
-
-    def is_sound(self, tests: Sequence[str], limit: float, how: str) -> bool:
-        """Return whether tests pass without a fault within a limit; a file of those that do not is not asked again."""
-        key = f"{how} {limit:.0f} {' '.join(tests)}" if len(tests) > 1 else f"{how} {tests[0]}"
-        if key not in self._sound:
-            outcome = self._tree.run(tests, limit, compiled=how == "compiled", faultless=True)
-            self._sound[key] = outcome.verdict == "passed"
-            if outcome.verdict == "passed" and len(tests) > 1:
-                self.learn(outcome, how)
-            elif outcome.verdict != "passed":
-                _say(f"not asked ({how} kernels), {outcome.verdict} without a fault: {outcome.failed_test or tests}")
-                worst = (outcome.failed_test or max(tests, key=self.seconds(how).__getitem__)).partition("::")[0]
-                self._seconds[how][worst] = math.inf
-            self._keep()
-        return self._sound[key]
-
-    def _keep(self) -> None:
-        self._file.write_text(json.dumps({"seconds": self._seconds, "sound": self._sound}, indent=1))
+def standing_at(root: Path, places: Sequence[str]) -> list[Mutation]:
+    """Return all mutations of lines, given as "replay/room/module.py:12"."""
+    result: list[Mutation] = []
+    for file, _, line in (place.rpartition(":") for place in places):
+        source = (root / file).read_text(encoding="utf-8")
+        result += [m for m in mutations_of(file, source) if m.line == int(line) and is_python(m.applied_to(source))]
+    return result
 
 
-def try_mutation(
-    mutation: Mutation, tree: Tree, targets: Targets, experience: Experience, options: argparse.Namespace
-) -> tuple[Outcome, str]:
+def try_mutation(mutation: Mutation, tree: Tree, reach: Reach, plain: Plain, budget: float) -> tuple[Outcome, str]:
     """Return what became of a mutation and how its kernels were run.
 
     Kernels are tried as plain Python first, by the tests that are quick so, because compiling takes longer than most of
     them; what survives that meets compiled ones.
     """
     text = mutation.applied_to((tree.root / mutation.file).read_text(encoding="utf-8"))
-    ways = ["plain", "compiled"] if has_kernels(tree.root / mutation.file) else ["compiled"]
-    ways = ways[:1] if options.plain else ways
+    known = reach.tests(mutation)
     spent = 0.0
-    for how in ways:
-        while True:
-            seconds = experience.seconds(how)
-            tests = targets.of(mutation.file, seconds, options.budget)
-            if how == "plain":
-                tests = [test for test in tests if seconds[test] <= options.budget]
-            if not tests:
-                outcome = Outcome("passed", 0.0, {}, "no test is about it")
-                break
-            limit = 30.0 + 3.0 * sum(seconds[test] for test in tests)
-            limit += 120.0 if ways == ["plain", "compiled"] and how == "compiled" else 0.0  # to compile what calls it
-            with tree.with_fault(mutation.file, text):
-                outcome = tree.run(tests, limit, compiled=how == "compiled")
-            spent += outcome.seconds
-            if outcome.verdict == "passed":
-                experience.learn(outcome, how)
-                break
-            suspects = [outcome.failed_test] if "::" in outcome.failed_test else tests
-            if experience.is_sound(suspects, limit, how):
-                return Outcome(outcome.verdict, spent, {}, outcome.text), how
-    return Outcome(outcome.verdict, spent, {}, outcome.text), how
+    if in_kernels := has_kernels(tree.root / mutation.file):
+        outcome = plain.trial(mutation, text, list(known)[:MOST], budget)
+        spent += outcome.seconds
+        if outcome.verdict == "failed":
+            return Outcome(outcome.verdict, spent, {}, outcome.text), "plain"
+        known = dict(sorted(known.items(), key=lambda item: item[0] in outcome.by_test))
+    tests = _within(known, budget)
+    if not tests:
+        return Outcome("passed", spent, {}, "no test is about it"), "compiled"
+    limit = 30.0 + 3.0 * sum(known[test] for test in tests) + (COMPILING if in_kernels else 0.0)
+    with tree.with_fault(mutation.file, text):
+        outcome = tree.run(tests, limit, compiled=True)
+    return Outcome(outcome.verdict, spent + outcome.seconds, {}, outcome.text), "compiled"
+
+
+def _within(known: dict[str, float], budget: float) -> list[str]:
+    """Return the first tests that take a time together; one at least."""
+    chosen: list[str] = []
+    for test, seconds in list(known.items())[:MOST]:
+        if not chosen or seconds <= budget:
+            chosen.append(test)
+            budget -= seconds
+    return chosen
+
+
+class Plain:
+    """Trials with kernels as plain Python; which tests pass so without a fault is kept in a file."""
+
+    def __init__(self, tree: Tree, file: Path) -> None:
+        self._tree = tree
+        self._file = file
+        self._sound: dict[str, bool] = json.loads(file.read_text()) if file.exists() else {}
+
+    def trial(self, mutation: Mutation, text: str, tests: list[str], budget: float) -> Outcome:
+        """Ask tests; one that fails and is not sound is not asked again."""
+        while tests := [test for test in tests if self._sound.get(test, True)]:
+            with self._tree.with_fault(mutation.file, text):
+                outcome = self._tree.run(tests, 2.0 * budget, compiled=False, each=EACH)
+            if outcome.verdict != "failed" or "::" not in outcome.failed_test or self._passes(outcome.failed_test):
+                return outcome
+        return Outcome("passed", 0.0, {}, "no test is about it")
+
+    def _passes(self, test: str) -> bool:
+        if test not in self._sound:
+            outcome = self._tree.run([test], 120.0, compiled=False, faultless=True)
+            self._sound[test] = outcome.verdict == "passed"
+            self._file.write_text(json.dumps(self._sound, indent=1))
+        return self._sound[test]
 
 
 def run_mutants(tree: Tree, work: Path, options: argparse.Namespace) -> bool:
     """Try the chosen mutations, tell the survivors and the figure by room; return whether enough are noticed."""
-    mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
-    targets = Targets(tree.root)
-    experience = Experience(tree, targets, work / "experience.json")
+    mutations, left_out = standing_at(tree.root, options.place), {}
+    if not options.place:
+        mutations, left_out = chosen(tree.root, options.count, options.seed, options.room)
+    reach = Reach(tree, Targets(tree.root), work / "reach")
+    plain = Plain(tree, work / "plain.json")
     results = _results(work / "results.jsonl", again=options.again)
-    todo = sorted((m for m in mutations if m.id not in results), key=lambda m: m.id)  # so that rooms take turns
+    # rooms take turns, those first that need no compiler
+    todo = sorted((m for m in mutations if m.id not in results), key=lambda m: (m.kernel, m.id))
     _say(f"{len(mutations)} mutants, {len(todo)} to be tried")
     for number, mutation in enumerate(todo, 1):
-        outcome, how = try_mutation(mutation, tree, targets, experience, options)
+        outcome, how = try_mutation(mutation, tree, reach, plain, options.budget)
         result = {
             "id": mutation.id,
             "place": f"{mutation.file}:{mutation.line}",
@@ -233,8 +229,9 @@ def run_planted(tree: Tree, names: Sequence[str]) -> bool:
     faults = [fault for fault in planted_faults() if not names or fault.name in names]
     tests = dict.fromkeys(test for fault in faults for test in fault.tests)
     outcome = tree.run(list(tests), 3000.0, compiled=True, faultless=True)
-    if outcome.verdict != "passed":
-        _say(f"the tests fail without a fault:\n{outcome.text}")
+    missing = [test for test in tests if not any(one.startswith(test) for one in outcome.by_test)]
+    if outcome.verdict != "passed" or missing:
+        _say(f"the tests fail without a fault, or are not there: {missing}\n{outcome.text}")
         return False
     good = True
     for fault in faults:
@@ -257,8 +254,10 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=330, help="mutants over all rooms")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--room", action="append", default=[], help="only this room's share; may be repeated")
+    parser.add_argument(
+        "--place", action="append", default=[], metavar="FILE:LINE", help="all mutants of a line instead"
+    )
     parser.add_argument("--budget", type=float, default=40.0, help="seconds of tests that are asked about one mutant")
-    parser.add_argument("--plain", action="store_true", help="kernels as plain Python alone: quick, and more survive")
     parser.add_argument("--again", action="store_true", help="try survivors of an earlier run again")
     parser.add_argument("--planted", nargs="*", metavar="NAME", help="the faults of planted.yaml instead, or some")
     parser.add_argument("--work", type=Path, default=CHECKOUT / "recordings" / "mutants")

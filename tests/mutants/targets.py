@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections import deque
-from collections.abc import Mapping
 from pathlib import Path
 
 LATE = ("tests/test_architecture.py", "tests/test_wheel.py", "tests/scenarios/", "tests/bench/", "tests/fuzz/")
@@ -24,14 +23,8 @@ class Targets:
                 if name in modules:
                     self._imported_by.setdefault(modules[name], set()).add(str(path.relative_to(root)))
 
-    def of(self, file: str, seconds: Mapping[str, float], budget: float) -> list[str]:
-        """Return the test files that are asked about a module, the nearest and quickest first.
-
-        Args:
-            file: the module, from the root.
-            seconds: how long each test file takes; one that is not there is not asked.
-            budget: seconds, beyond which no further file is taken; one is always taken.
-        """
+    def of(self, file: str) -> list[str]:
+        """Return the test files that are about a module, given from the root: the nearest first."""
         distance = {file: 0}
         queue = deque([file])
         while queue:
@@ -41,17 +34,20 @@ class Targets:
                     queue.append(other)
         folder, _, name = file.removeprefix("replay/").rpartition("/")
         mirror = str(Path("tests", folder, f"test_{name}"))
-        known = [test for test in self._tests if test in seconds and (test in distance or test == mirror)]
+        known = [test for test in self._tests if test in distance or test == mirror]
 
-        def order(test: str) -> tuple[bool, int, float]:
-            return test.startswith(LATE), 0 if test == mirror else distance[test], seconds[test]
+        def order(test: str) -> tuple[bool, int, bool]:
+            return (
+                test.startswith(LATE),
+                0 if test == mirror else distance[test],
+                Path(test).parent != Path("tests", folder),
+            )
 
-        chosen: list[str] = []
-        for test in sorted(known, key=order):
-            if not chosen or seconds[test] <= budget:
-                chosen.append(test)
-                budget -= seconds[test]
-        return chosen
+        return sorted(known, key=order)
+
+    def importers(self, file: str) -> set[str]:
+        """Return the files that import a module themselves."""
+        return self._imported_by.get(file, set())
 
     @property
     def tests(self) -> list[str]:

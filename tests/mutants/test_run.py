@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutants.mutations import Mutation, is_python, mutations_of
-from tests.mutants.run import CHECKOUT, equivalents, planted_faults
+from tests.mutants.run import CHECKOUT, equivalents, planted_faults, standing_at
 from tests.mutants.targets import Targets
 
 SOURCE = '''"""Docstring 1 < 2."""
@@ -79,6 +79,13 @@ def test_every_kind_of_slip_is_found_where_it_can_be_noticed_and_nowhere_else():
         found[0].applied_to("\n" + SOURCE)
 
 
+def test_all_mutants_of_a_line_can_be_asked_for():
+    place = "replay/__init__.py:71"
+    found = standing_at(CHECKOUT, [place])
+    assert {(m.file, m.line) for m in found} == {("replay/__init__.py", 71)}
+    assert {m.kind for m in found} >= {"and/or", "not"}
+
+
 def test_alike_places_of_a_file_have_different_names():
     first, second = (
         m for m in mutations_of("replay/a.py", "def f(x):\n    x[1]()\n    x[1]()\n") if m.kind == "constant"
@@ -87,36 +94,41 @@ def test_alike_places_of_a_file_have_different_names():
     assert isinstance(first, Mutation)
 
 
-def test_the_nearest_and_quickest_tests_are_asked_and_those_of_everything_last(tmp_path):
-    files = {
-        "replay/room/thing.py": "",
-        "replay/room/user.py": "from replay.room.thing import x\n",
-        "tests/room/test_thing.py": "",
-        "tests/room/test_slow.py": "from replay.room import thing\n",
-        "tests/room/test_quick.py": "def test():\n    import replay.room.thing\n",
-        "tests/room/shared.py": "from replay.room.thing import x\n",
-        "tests/room/test_user.py": "from replay.room.user import y\n",
-        "tests/room/test_shared.py": "from tests.room.shared import x\n",
-        "tests/test_wheel.py": "import replay.room.thing\n",
-        "tests/room/test_other.py": "import json\n",
-        "replay/room/__init__.py": "__getattr__ = submodules(x='lazy')",
-        "replay/room/lazy.py": "",
-    }
+def written(root, files):
     for name, text in files.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
-    seconds = {f"tests/room/test_{name}.py": 1.0 for name in ("thing", "quick", "user", "shared", "other")}
-    seconds |= {"tests/room/test_slow.py": 5.0, "tests/test_wheel.py": 0.1}
-    assert "tests/room/test_slow.py" in Targets(tmp_path).of("replay/room/lazy.py", seconds, 100.0)
-    every = Targets(tmp_path).of("replay/room/thing.py", seconds, 100.0)
-    near = [Path(name).stem.removeprefix("test_") for name in every]
-    assert near == ["thing", "quick", "slow", "shared", "user", "wheel"]
-    assert Targets(tmp_path).of("replay/room/thing.py", seconds, 4.5) == [
-        name for name, stem in zip(every, near, strict=True) if stem != "slow"
-    ]
-    assert Targets(tmp_path).of("replay/room/thing.py", {"tests/room/test_slow.py": 5.0}, 1.0) == [
-        "tests/room/test_slow.py"
-    ]
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+
+
+def test_the_nearest_tests_are_asked_and_those_of_everything_last(tmp_path):
+    written(
+        tmp_path,
+        {
+            "replay/room/thing.py": "",
+            "replay/room/user.py": "from replay.room.thing import x\n",
+            "tests/room/test_thing.py": "",
+            "tests/room/test_first.py": "def test():\n    import replay.room.thing\n",
+            "tests/test_other_room.py": "from replay.room import thing\n",
+            "tests/room/shared.py": "from replay.room.thing import x\n",
+            "tests/room/test_user.py": "from replay.room.user import y\n",
+            "tests/room/test_shared.py": "from tests.room.shared import x\n",
+            "tests/test_wheel.py": "import replay.room.thing\n",
+            "tests/room/test_other.py": "import json\n",
+            "replay/room/__init__.py": "__getattr__ = submodules(x='lazy')",
+            "replay/room/lazy.py": "",
+        },
+    )
+    targets = Targets(tmp_path)
+    assert "tests/test_other_room.py" in targets.of("replay/room/lazy.py")
+    near = [Path(name).stem.removeprefix("test_") for name in targets.of("replay/room/thing.py")]
+    assert near == ["thing", "first", "other_room", "shared", "user", "wheel"]
+    assert targets.importers("replay/room/thing.py") == {
+        "replay/room/user.py",
+        "tests/room/test_first.py",
+        "tests/test_other_room.py",
+        "tests/room/shared.py",
+        "tests/test_wheel.py",
+    }
 
 
 TREE = """
@@ -124,29 +136,30 @@ import sys
 from pathlib import Path
 from tests.mutants.trial import Tree
 tree = Tree(Path(sys.argv[1]), Path(sys.argv[2]))
+"""
+
+TRIALS = """
 def ask(text):
     with tree.with_fault("replay/a.py", text):
         outcome = tree.run(["tests/test_a.py"], 5.0, compiled=False)
-    print(outcome.verdict, "FAILED tests/test_a.py::test_a" in outcome.text)
+    print(outcome.verdict, outcome.failed_test == "tests/test_a.py::test_a")
 for text in ("x = 1", "x = 2", "x = 1", "while True: pass", "1 / 0", "import os; os.abort()", "x = 1"):
     ask(text + "\\n")
 """
 
 
-def test_a_fault_is_noticed_a_hang_is_ended_and_the_tree_is_as_before(tmp_path):
+def told(tmp_path, files, script):
+    """Lines that a script prints which has the tree of a package of some files."""
     checkout, work = tmp_path / "checkout", tmp_path / "work"
-    for name, text in (
-        ("replay/__init__.py", ""),
-        ("replay/a.py", "x = 1\n"),
-        ("tests/__init__.py", ""),
-        ("tests/test_a.py", "import replay.a\n\n\ndef test_a():\n    assert replay.a.x == 1\n"),
-    ):
-        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
-        (checkout / name).write_text(text)
+    written(checkout, {"replay/__init__.py": "", "tests/__init__.py": "", **files})
     work.mkdir()
-    command = [sys.executable, "-c", TREE, str(checkout), str(work)]
-    said = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=True).stdout.splitlines()
-    assert said == [
+    command = [sys.executable, "-c", TREE + script, str(checkout), str(work)]
+    return subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+def test_a_fault_is_noticed_a_hang_is_ended_and_the_tree_is_as_before(tmp_path):
+    test = "import replay.a\n\n\ndef test_a():\n    assert replay.a.x == 1\n"
+    assert told(tmp_path, {"replay/a.py": "x = 1\n", "tests/test_a.py": test}, TRIALS) == [
         "passed False",
         "failed True",
         "passed False",
@@ -155,8 +168,63 @@ def test_a_fault_is_noticed_a_hang_is_ended_and_the_tree_is_as_before(tmp_path):
         "failed False",
         "passed False",
     ]
-    assert (work / "tree" / "replay" / "a.py").read_text() == "x = 1\n"
-    assert (checkout / "replay" / "a.py").read_text() == "x = 1\n"
+    assert (tmp_path / "work" / "tree" / "replay" / "a.py").read_text() == "x = 1\n"
+    assert (tmp_path / "checkout" / "replay" / "a.py").read_text() == "x = 1\n"
+
+
+LEFT = """
+outcome = tree.run(["tests/test_a.py"], 60.0, compiled=True, each=0.2)
+print(outcome.verdict, list(outcome.by_test))
+"""
+
+
+def test_a_test_that_takes_too_long_is_left_and_no_fault(tmp_path):
+    test = "def test_long():\n    while True:\n        pass\n\n\ndef test_short():\n    pass\n"
+    assert told(tmp_path, {"tests/test_a.py": test}, LEFT) == ["passed ['tests/test_a.py::test_short']"]
+
+
+REACH = """
+from tests.mutants.mutations import mutations_of
+from tests.mutants.reach import Reach
+from tests.mutants.targets import Targets
+reach = Reach(tree, Targets(tree.root), Path(sys.argv[2]) / "reach")
+for mutation in mutations_of("replay/a.py", (tree.root / "replay/a.py").read_text()):
+    print(mutation.line, *(test.partition("::")[2] for test in reach.tests(mutation)))
+"""
+
+REACHED = """
+import numba
+LIMIT = 3
+def quick(x):
+    return x + 1
+@numba.njit
+def compiled(x):
+    return x * 2
+def slow(x):
+    return compiled(x)
+def bounded(x):
+    return min(x, LIMIT)
+"""
+
+REACHING = """
+from replay.a import *
+def test_quick(): assert quick(1) == 2
+def test_slow(): assert slow(1) == 2
+def test_bounded(): assert bounded(1) == 1
+def test_failing(): assert bounded(1) == 2
+def test_nothing(): pass
+"""
+
+
+def test_the_tests_that_execute_a_line_are_asked_first_or_else_those_that_execute_what_names_it(tmp_path):
+    """Compiled lines and constants are executed by no test; their users are. A test that fails anyway is not asked."""
+    lines = told(tmp_path, {"replay/a.py": REACHED, "tests/test_a.py": REACHING}, REACH)
+    first = {int(line): (test, set(others)) for line, test, *others in map(str.split, lines)}
+    all_of_them = {"test_quick", "test_slow", "test_bounded", "test_nothing"}
+    assert first == {
+        line: (test, all_of_them - {test})
+        for line, test in ((3, "test_bounded"), (5, "test_quick"), (8, "test_slow"), (12, "test_bounded"))
+    }
 
 
 @pytest.mark.parametrize("fault", planted_faults(), ids=lambda fault: fault.name)

@@ -18,8 +18,9 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -39,16 +40,17 @@ PRELOADED = (
         "mpmath",
         "fcl",
         "xmlschema",
+        "coverage",
     ),
 )
 """Packages that a trial finds imported; `replay` and `tests` are each trial's own."""
 MOST_MEMORY = 3 << 30
 """Bytes of a trial and its children; beyond, it is ended."""
-_OPTIONS = ("-x", "-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
+_OPTIONS = ("-q", "--no-header", "--tb=line", "-p", "no:cacheprovider")
 _OPTIONS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is preloaded
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
-_BY_FILE = "seconds.json"
-_NO_TEST = 5  # pytest's exit code
+_TOLD = "told.json"
+_NO_TEST = 5  # pytest's exit code when all are left out
 _PAUSE = 0.05  # seconds between two looks
 _CLOCK = 10.0  # what a limit of processor time is by the clock: the machine may be busy, and tests wait for processes
 
@@ -60,14 +62,16 @@ class Outcome:
     Attributes:
         verdict: "passed", "failed", "too long" or "too large".
         seconds: processor time of the process and of those that it waited for.
-        by_file: processor time of each test file; nothing of a trial that did not pass.
+        by_test: processor time of each test that passed.
         text: the end of what it printed.
+        lines: by module and line which of these tests executed it, as a number whose bits are in their order.
     """
 
     verdict: str
     seconds: float
-    by_file: dict[str, float]
+    by_test: dict[str, float]
     text: str
+    lines: dict[str, dict[str, str]] = field(default_factory=dict)
 
     @property
     def failed_test(self) -> str:
@@ -107,7 +111,16 @@ class Tree:
         self._stamp += 2.0
         os.utime(path, (self._stamp, self._stamp))
 
-    def run(self, tests: Sequence[str], limit: float, *, compiled: bool, faultless: bool = False) -> Outcome:
+    def run(
+        self,
+        tests: Sequence[str],
+        limit: float,
+        *,
+        compiled: bool,
+        faultless: bool = False,
+        each: float = math.inf,
+        reach: bool = False,
+    ) -> Outcome:
         """Run tests until the first fails.
 
         Args:
@@ -115,6 +128,8 @@ class Tree:
             limit: seconds of processor time that a process may take; what waits without an end is ended by the clock.
             compiled: whether kernels are compiled; else they are plain Python.
             faultless: keep the kernels that are compiled: no fault is in the tree.
+            each: seconds of processor time that a test may take; then it is left, and not among the outcome's tests.
+            reach: run all, also after one that fails, and note which lines of the package each executes.
         """
         cache = self.kernels
         if not faultless:
@@ -127,15 +142,16 @@ class Tree:
         child = os.fork()
         if child == 0:
             resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(limit),) * 2)
-            _be_pytest(self.root, tests, output, cache, self._temporary, compiled=compiled)
+            watch = _Watch(self._temporary / _TOLD, each, limit / 2, self.root if reach else None)
+            _be_pytest(self.root, tests, output, cache, self._temporary, watch, compiled=compiled)
         try:
             verdict, seconds = _watch(child, time.monotonic() + _CLOCK * limit)
         finally:
             _end_descendants()
         text = output.read_text(errors="replace")[-3000:] if output.exists() else ""
-        file = self._temporary / _BY_FILE
-        by_file = json.loads(file.read_text()) if verdict == "passed" and file.exists() else {}
-        return Outcome(verdict, seconds, by_file, text)
+        file = self._temporary / _TOLD
+        told = json.loads(file.read_text()) if file.exists() else {"seconds": {}, "lines": {}}
+        return Outcome(verdict, seconds, told["seconds"], text, told["lines"])
 
 
 def preload() -> None:
@@ -147,7 +163,9 @@ def preload() -> None:
         importlib.import_module(name)
 
 
-def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temporary: Path, *, compiled: bool) -> None:
+def _be_pytest(
+    root: Path, tests: Sequence[str], output: Path, cache: Path, temporary: Path, watch: _Watch, *, compiled: bool
+) -> None:
     """Become a process that runs tests and ends with pytest's exit code; never returns."""
     code = 70
     try:
@@ -169,7 +187,8 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
         sys.path[:] = [str(root), *(place for place in sys.path if Path(place).resolve() not in (Path.cwd(), root))]
         importlib.invalidate_caches()
         pytest = importlib.import_module("pytest")
-        code = int(pytest.main([*_OPTIONS, *tests], plugins=[_Watch(temporary / _BY_FILE)]))
+        watch.begin()
+        code = int(pytest.main([*_OPTIONS, *([] if watch.reaches else ["-x"]), *tests], plugins=[watch]))
     except BaseException as error:  # whatever a fault does
         print(f"{type(error).__name__}: {error}", flush=True)
     finally:
@@ -180,22 +199,74 @@ def _be_pytest(root: Path, tests: Sequence[str], output: Path, cache: Path, temp
 
 
 class _Watch:
-    """A plugin of pytest that notes how long the tests of each file take."""
+    """A plugin of pytest that notes how long tests take and, where asked, which lines they execute.
 
-    def __init__(self, file: Path) -> None:
+    A test that takes too long is left, and none is begun when all have taken too long.
+    """
+
+    def __init__(self, file: Path, each: float, whole: float, reached: Path | None) -> None:
         self._file = file
+        self._each = each
+        self._whole = whole
+        self._reached = reached
+        self._coverage: Any = None
         self._seconds: dict[str, float] = {}
+        self._begin = 0.0
 
-    def pytest_runtest_logfinish(self, nodeid: str) -> None:
-        """Note the time since the last test; `nodeid` begins with the file."""
-        file = nodeid.partition("::")[0]
-        now = time.process_time()
-        self._seconds[file] = self._seconds.get(file, 0.0) + now - getattr(self, "_before", 0.0)
-        self._before = now
+    @property
+    def reaches(self) -> bool:
+        """Whether lines are noted."""
+        return self._reached is not None
+
+    def begin(self) -> None:
+        """Begin to note lines: before the package is imported."""
+        if self._reached:
+            source = str(self._reached / "replay")
+            self._coverage = importlib.import_module("coverage").Coverage(
+                data_file=None, config_file=False, source=[source]
+            )
+            self._coverage.start()
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Begin a test, with what is set up for it."""
+        self._begin = time.process_time()
+        if self._coverage:
+            self._coverage.switch_context(nodeid)
+        if self._each < math.inf:
+            signal.signal(signal.SIGPROF, _leave)
+            signal.setitimer(signal.ITIMER_PROF, self._each if self._begin < self._whole else 0.01)
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """Note what passed."""
+        if report.when == "call" and report.passed:
+            self._seconds[report.nodeid] = round(time.process_time() - self._begin, 3)
+
+    def pytest_runtest_logfinish(self) -> None:
+        """End a test."""
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     def pytest_sessionfinish(self) -> None:
         """Write what was noted."""
-        self._file.write_text(json.dumps(self._seconds))
+        lines = self._lines() if self._coverage else {}
+        self._file.write_text(json.dumps({"seconds": self._seconds, "lines": lines}))
+
+    def _lines(self) -> dict[str, dict[str, str]]:
+        self._coverage.stop()
+        data = self._coverage.get_data()
+        bit = {test: 1 << number for number, test in enumerate(self._seconds)}
+        return {
+            str(Path(file).relative_to(self._reached)): {
+                str(line): f"{bits:x}"
+                for line, contexts in data.contexts_by_lineno(file).items()
+                if (bits := sum(bit.get(context, 0) for context in contexts))
+            }
+            for file in data.measured_files()
+        }
+
+
+def _leave(*_: object) -> None:
+    """Leave a test that takes too long."""
+    importlib.import_module("pytest").skip("takes too long")
 
 
 def _watch(child: int, deadline: float) -> tuple[str, float]:
@@ -216,11 +287,9 @@ def _watch(child: int, deadline: float) -> tuple[str, float]:
         else:
             time.sleep(_PAUSE)
     code = os.waitstatus_to_exitcode(status)
-    if code == _NO_TEST:
-        raise RuntimeError("no test was found")
     if code in (-signal.SIGXCPU, -signal.SIGKILL):
         verdict = verdict or "too long"
-    return verdict or ("passed" if code == 0 else "failed"), used.ru_utime + used.ru_stime
+    return verdict or ("passed" if code in (0, _NO_TEST) else "failed"), used.ru_utime + used.ru_stime
 
 
 def _end_descendants() -> None:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet
 import pytest
+from mcap.writer import Writer
 
 from replay.errors import InvalidValue, RecordingExistsError
+from replay.logs.mcap_reader import McapLog
 from replay.recording.export import export, tables
 from replay.recording.reader import Recording, read
 from tests.recording.test_round_trip import write
@@ -118,3 +121,30 @@ def test_a_topic_has_its_own_file_whichever_others_are_wanted(recording: Recordi
     assert [path.name for path in paths] == ["made_up.distance_Tip_1.csv", "made_up.distance_tip_1_2.csv"]
     (alone,) = export(alike, tmp_path, format="csv", topics=["/distance/tip_1"], overwrite=True)
     assert alone == paths[1]
+
+
+def log_of(path: Path, topics: Iterable[str]) -> Path:
+    """A log of others with a message a topic."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("x", "jsonschema", b'{"type": "object"}')
+        for k, topic in enumerate(topics):
+            writer.add_message(writer.register_channel(topic, "json", schema), k, b'{"a": 1}', k)
+        writer.finish()
+    return path
+
+
+def test_any_topic_has_a_file_that_stays_in_the_folder(tmp_path: Path) -> None:
+    topics = ["../../evil", "/etc/passwd", "a" * 400, "a" * 401, "", "..", "/a/b", "/A/B", "/a_b_2", "\0", "\x1b[31m"]
+    with McapLog(log_of(tmp_path / "log.mcap", topics)) as log:
+        files = export(log, tmp_path / "out", format="csv")
+    assert len({file.name.casefold() for file in files}) == len(topics)
+    assert sorted(tmp_path.rglob("*.csv")) == sorted(files)
+
+
+def test_very_many_topics_whose_files_would_have_one_name_are_named_soon(tmp_path: Path) -> None:
+    topics = ["!" * (k % 100) + "?" * (k // 100) for k in range(9_000)]
+    with McapLog(log_of(tmp_path / "log.mcap", topics)) as log:
+        (file,) = export(log, tmp_path / "out", format="csv", topics=["!"])
+    assert file.name == "log._2.csv"

@@ -17,6 +17,8 @@ ROOT = Path(replay.__file__).parents[1]
 SCRIPT = Path(__file__).parent / "read_by_mcap_core.mjs"
 PACKAGES = ("@mcap/core", "@mcap/nodejs", "@mcap/support", "protobufjs")
 LAYOUT = ROOT / "schemas" / "foxglove_layout.json"
+OF_ALL = {"collision": messages.COLLISION, "guards": messages.GUARDS}
+"""Topics of all pairs and of all guards, and their types."""
 
 
 @pytest.mark.soak
@@ -65,7 +67,7 @@ def test_the_layout_for_foxglove_shows_fields_that_there_are():
     for path in plots():
         topic, _, field = path.partition(".")
         kind = topic.split("/")[1]
-        message = messages.COLLISION if kind == "collision" else KINDS[kind].message
+        message = OF_ALL.get(kind) or KINDS[kind].message
         assert field.partition("[")[0] in messages.message_class(message).DESCRIPTOR.fields_by_name, path
 
 
@@ -78,4 +80,4 @@ def test_the_layout_for_foxglove_names_the_sensors_of_shipped_scenarios():
         for kind in KINDS.values()
         for name in scenario.sensors.of(kind.name)
     }
-    assert {path.partition(".")[0] for path in plots()} - {"/collision"} <= known
+    assert {path.partition(".")[0] for path in plots()} - {f"/{topic}" for topic in OF_ALL} <= known

@@ -46,7 +46,7 @@ def test_field_numbers_stay_for_ever() -> None:
             "between": 5,
             "clearance_bound": 6,
         },
-        "Layout": {"links": 1, "joints": 2, "pairs": 3, "shapes": 4, "objects": 5, "sensors": 6},
+        "Layout": {"links": 1, "joints": 2, "pairs": 3, "shapes": 4, "objects": 5, "sensors": 6, "guards": 7},
         "GuardStates": {"state": 1, "condition": 2, "factor": 3, "rate": 4, "script_time": 5},
         "DistanceReading": {
             "status": 1,

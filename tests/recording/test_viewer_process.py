@@ -4,6 +4,7 @@ import contextlib
 import json
 import re
 import shutil
+import socket
 import subprocess
 import time
 from pathlib import Path
@@ -31,6 +32,20 @@ def test_a_home_refuses_statistics_and_goes_with_all_that_was_written(monkeypatc
         assert where.environment["HTTPS_PROXY"] == where.environment["https_proxy"] == "http://127.0.0.1:9"
         (Path(where.environment["TMPDIR"]) / "rerun-data-1").mkdir()
     assert not where.home.exists()
+
+
+def test_a_free_port_is_the_one_that_the_system_gave(monkeypatch):
+    given = []
+
+    class Noted(socket.socket):
+        def bind(self, address):
+            super().bind(address)
+            given.append((address, self.getsockname()))
+
+    monkeypatch.setattr(socket, "socket", Noted)
+    port = free_port()
+    (((host, wanted), (_, found)),) = given
+    assert (host, wanted, found) == ("127.0.0.1", 0, port)  # 0: any that is free
 
 
 def asked(environment, recording, folder):

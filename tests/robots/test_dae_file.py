@@ -48,6 +48,29 @@ def test_unit_and_the_axis_that_points_up_are_applied(up, far, faces, tmp_path):
     assert np.sum(a * np.cross(b, c)) / 6 == pytest.approx(1.0, rel=1e-12)  # still seen from outside
 
 
+def test_colours_that_are_missing_take_no_body_away(tmp_path):
+    """A picture that is not there breaks its effect, that the material, and that what is bound to it."""
+    bound = '<instance_material symbol="m" target="#m"/>'
+    placed = f'<instance_geometry url="#g"><bind_material><technique_common>{bound}</technique_common></bind_material>'
+    found = read(tmp_path, node=f"{placed}</instance_geometry>")
+    np.testing.assert_array_equal(found.triangles, read(tmp_path).triangles)
+
+
+@pytest.mark.parametrize(
+    ("node", "rule"),
+    [
+        (f'{PLACED}<instance_geometry url="#h"/>', "a node has the geometry 'h', which is not there"),
+        (f'{PLACED}<instance_node url="#h"/>', "has no scene that can be used: .*h"),
+        (f'{PLACED}<node><instance_node url="#h"/></node>', "has no scene that can be used: .*h"),
+        (f'{PLACED}<instance_controller url="#h"/>', "a node has <instance_controller>, which is not read"),
+        (f"<skew>45 1 0 0 0 1 0</skew>{PLACED}", "a node has <skew>, which is not read"),
+    ],
+)
+def test_what_cannot_be_read_of_a_scene_is_refused_and_not_left_out(node, rule, tmp_path):
+    with pytest.raises(RobotError, match=rule):
+        read(tmp_path, node=node)
+
+
 def test_nodes_place_what_they_hold(tmp_path):
     inner = f"<node><scale>2 1 1</scale>{PLACED}</node>"
     node = f"<translate>10 0 0</translate><rotate>0 0 1 90</rotate>{inner}<node><scale>-1 1 1</scale>{PLACED}</node>"

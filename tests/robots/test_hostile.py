@@ -31,6 +31,10 @@ WRONG = {
     "no XML": ("robot", "is not XML"),
     "nothing": ("", "is not XML: no element found"),
     "a page": ("<html/>", "begins with <html>, not with <robot>"),
+    "nothing but a macro": (
+        "<robot name='r'><xacro:make_pelvis/></robot>",
+        "the robot has no link, but <xacro:make_pelvis>, which is a macro of xacro that was not expanded",
+    ),
     "no link": ("<robot name='r'/>", "the robot has no link"),
     "a million links": (many(10**6), "elements that are read"),
     "more links than a part may have": (star(30_000, ""), "would not be a valid part"),

@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy
 import pytest
 
 from replay.errors import RobotError
 from replay.robots.importing import Options, run
+from replay.robots.meshes import _in_python_package
 from replay.robots.packages import Packages
 from replay.robots.xml_text import XmlElement
 from tests.robots import made
@@ -56,10 +58,44 @@ def test_packages_are_found_by_their_manifest_and_where_ros_says(tmp_path):
     )  # given ones first
 
 
+def test_files_of_python_packages_are_called_by_their_package():
+    """Not one of a folder beside the packages that is none, nor one outside."""
+    site = Path(numpy.__file__).parents[1]
+    assert _in_python_package(site / "numpy" / "testing" / "a.stl") == "package://numpy/testing/a.stl"
+    assert _in_python_package(site / "cmeel.prefix" / "a.stl") is None
+    assert _in_python_package(site / "no_such_package" / "a.stl") is None
+    assert _in_python_package(site / "a.stl") is None
+    assert _in_python_package(site.parent / "numpy" / "a.stl") is None
+
+
 def test_a_tree_that_lost_the_name_of_its_package_is_told(tmp_path):
     path = put(tmp_path / "moved" / "meshes" / "a.stl")
     here = found(tmp_path / "moved" / "urdf", "package://robot/meshes/a.stl")
     assert here.path == path and here.assumed == f"package robot is taken to be {tmp_path / 'moved'}"
+
+
+@pytest.mark.parametrize(
+    ("written", "mesh", "taken"),
+    [
+        (
+            "package://lab/models/robot/meshes/a.stl",
+            "robot/meshes/a.stl",
+            "package lab/models/robot is taken to be {}/robot",
+        ),
+        ("package://collision/a.stl", "robot/meshes/x/collision/a.stl", "{}/robot/meshes/x/collision"),
+    ],
+)
+def test_a_tree_that_was_moved_in_part_is_told(written, mesh, taken, tmp_path):
+    path = put(tmp_path / mesh)
+    here = found(tmp_path / "robot" / "urdf", written)
+    assert here.path == path and here.assumed.endswith(taken.format(tmp_path))
+
+
+def test_a_folder_that_is_there_twice_is_no_package(tmp_path):
+    for kind in "xy":
+        put(tmp_path / "robot" / "meshes" / kind / "collision" / "a.stl")
+    with pytest.raises(RobotError, match=r"is in each of .*; say in which with --package collision=DIR"):
+        found(tmp_path / "robot" / "urdf", "package://collision/a.stl")
 
 
 def test_what_is_not_found_says_where_it_was_looked_for(tmp_path):

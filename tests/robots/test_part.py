@@ -147,6 +147,39 @@ def test_pairs_in_one_rigid_part_and_of_the_srdf_are_disabled(tmp_path):
     assert "state out: joint cd at 9 is beyond its limits 0.5 and 3: left out" in told(done)
 
 
+def test_the_only_two_bodies_of_a_robot_may_be_a_disabled_pair(tmp_path):
+    done = imported(
+        tmp_path,
+        *(made.link(name, BOX) for name in ("a", "b")),
+        made.joint("ab", "a", "b", "revolute", TURN),
+        srdf='<disable_collisions link1="b" link2="a" reason="Never"/>',
+    )
+    assert done.part.disabled == [("a", "b", "Never")]
+    assert "without bodies" not in told(done)
+
+
+def test_a_joint_that_follows_one_without_a_position_is_held_where_that_puts_it(tmp_path):
+    """A fixed joint has no position, so what mimics it is at its offset: 0.7 rad, between its limits, or at 0."""
+    done = imported(
+        tmp_path,
+        *(made.link(name, BOX) for name in ("a", "b", "c", "d", "e")),
+        made.joint("stiff", "a", "b"),
+        made.joint("turned", "a", "c", "revolute", f'{TURN}<mimic joint="stiff" multiplier="2" offset="0.7"/>'),
+        made.joint("spun", "a", "d", "continuous", '<mimic joint="stiff"/>'),
+        made.joint("glued", "a", "e", "fixed", '<mimic joint="turned"/>'),
+    )
+    links = loaded(tmp_path).links
+    for name, held in (("c", 0.7), ("d", 0.0)):
+        joint = links[name].joint
+        assert (joint.type, joint.lower, joint.upper, joint.mimic) == ("revolute", held, held, None)
+    for line in (
+        "joint turned: mimics stiff, which has no position: it is held at 0.7",
+        "joint spun: mimics stiff, which has no position: it is held at 0",
+        "joint glued: is fixed: <mimic> is dropped",
+    ):
+        assert line in told(done)
+
+
 def test_limits_of_moveit_replace_those_of_the_description(tmp_path):
     (tmp_path / "limits.yaml").write_text(
         "joint_limits:\n"
@@ -183,8 +216,36 @@ def test_limits_that_leave_a_leader_no_position_are_dropped_with_a_loss(tmp_path
         made.joint("j", "a", "b", "revolute", TURN),
         made.joint("k", "a", "c", "revolute", follower),
     )
-    assert done.lossy and "they leave no position to j, which it follows" in told(done)
+    assert done.lossy and "they leave nowhere to go to j, which it follows" in told(done)
     assert loaded(tmp_path).links["c"].joint.lower == -np.inf
+
+
+def test_limits_that_leave_a_leader_one_position_are_dropped_with_a_loss(tmp_path):
+    """A gripper as some describe it: its tips turn against it, with the limits of the fingers."""
+    follower = '<limit lower="0" upper="1" velocity="1" effort="1"/><mimic joint="j" multiplier="-1"/>'
+    done = imported(
+        tmp_path,
+        *(made.link(name) for name in "abc"),
+        made.joint("j", "a", "b", "revolute", '<limit lower="0" upper="1" velocity="1" effort="1"/>'),
+        made.joint("k", "b", "c", "revolute", follower),
+    )
+    assert done.lossy and "its limits 0 and 1 are dropped: they leave nowhere to go to j" in told(done)
+    links = loaded(tmp_path).links
+    assert (links["c"].joint.lower, links["b"].joint.lower, links["b"].joint.upper) == (-np.inf, 0.0, 1.0)
+
+
+def test_a_rate_below_zero_limits_nothing(tmp_path):
+    turn = '<limit lower="0" upper="1" velocity="-1" effort="-1"/>'
+    done = imported(tmp_path, made.link("a"), made.link("b"), made.joint("j", "a", "b", "revolute", turn))
+    assert "joint j: a limit of velocity of -1, by which nothing moves, is left out" in told(done)
+
+
+def test_macros_that_were_not_expanded_are_told_and_what_they_may_stand_for_is_a_loss(tmp_path):
+    shown = f"<visual><geometry>{BOX}</geometry><xacro:grey/></visual>"
+    done = imported(tmp_path, f'<link name="a">{shown}<collision><geometry>{BOX}</geometry></collision></link>')
+    assert not done.lossy and "link a: <xacro:grey> of a <visual> is not used" in told(done)
+    done = imported(tmp_path, made.link("a", BOX), "<xacro:sensors/>")
+    assert done.lossy and "1 x <xacro:sensors>: is a macro of xacro that was not expanded" in told(done)
 
 
 def test_a_part_that_was_changed_by_hand_is_not_replaced(tmp_path):

@@ -182,6 +182,21 @@ def test_what_lies_between_frames_counts(size, expectation, contact, rows, undec
     assert (outcome.passed, outcome.detail) == (passed, detail.replace("@", "cube/a | plate/b"))
 
 
+@pytest.mark.parametrize(
+    ("expected", "rows", "value", "time", "margin"),
+    [
+        ("min: 0.2", [], 0.25, 0.0, 0.05),
+        ("min: 0.3", [], 0.25, 0.0, -0.05),
+        ("min: 0.2", TUNNEL, 0.0, 0.46, -0.2),  # on the wrong side of the limit by all of it
+    ],
+)
+def test_a_clearance_as_a_number_is_none_where_bodies_meet_between_frames(expected, rows, value, time, margin):
+    told = judged(f"{{pair: [cube, '*'], clearance: {{{expected}}}}}", blocks([], rows, [], 4)).measure
+    assert (told.value, told.unit, told.subject) == (value, "m", "cube/a | plate/b")
+    assert told.time == pytest.approx(time, abs=1e-6)
+    assert (told.margin, told.limit) == (pytest.approx(margin, rel=1e-12), float(expected[5:]))
+
+
 def judged(expectation, found):
     scenario = load_sources("f.yaml", {"f.yaml": TEXT.format(expectation).encode()})
     check = ExpectationCheck(scenario.expect, LAYOUT, margin=0.5, provenance=scenario.provenance)

@@ -36,6 +36,8 @@ NAMES = (
 )
 REACTING = {f"carm_bodyguard_{what}" for what in ("reaction", "stops", "stops_late", "stops_thesis")}
 """Those with guards, which `test_guards.py` is about."""
+MEASURED = {"carm_parking_measured"}
+"""Those with a log of the machine, which `test_measured_log.py` is about."""
 FILES = sorted(SCENARIOS.rglob("*.yaml"))
 
 PANEL = (np.array([0.42, 0.42, 0.12]), np.array([0.0, 0.0, 0.06]))  # size, middle in the detector's frame [m]
@@ -121,7 +123,7 @@ def test_the_folder_holds_these_scenarios():
         assert scenario.description
         assert scenario.tags
         assert scenario.expect or "nightly" not in scenario.tags
-    assert {scenario.name for scenario in found if "nightly" in scenario.tags} == {*NAMES, *REACTING}
+    assert {scenario.name for scenario in found if "nightly" in scenario.tags} == {*NAMES, *REACTING, *MEASURED}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -8,8 +8,7 @@ is optimised as a whole, and is kept under the kernel's key (`reach`, `store`). 
 package's policy LLVM reorders and contracts nothing.
 
 Besides, while kernels are compiled: Python's garbage collection rests (what it looks through is all in use); constants
-among arguments do not make specialisations; the types of operators on numbers are looked for once; and numba's option
-sets compare without rebuilding their defaults.
+among arguments do not make specialisations; and what leads from Python to LLVM does less (`front_end`).
 
 None of this is public in numba, so it holds for the versions it was tried with, `TRIED`. With another version, or when
 a name that it needs is gone, `AVAILABLE` is false and kernels are compiled by numba's public decorator: the same
@@ -21,7 +20,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import operator
 import os
 import pickle
 from collections.abc import Iterator
@@ -31,8 +29,8 @@ import numba
 from numba import config, types
 from numba.core import event
 
-from replay.numerics.jit import progress, store
-from replay.numerics.jit.linking import NEEDED, KernelLibrary
+from replay.numerics.jit import front_end, linking, progress, store
+from replay.numerics.jit.linking import KernelLibrary
 from replay.numerics.jit.reach import key_of, name_of, reached
 
 TRIED = ("0.68.",)
@@ -45,15 +43,12 @@ try:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.options import DefaultOptions
     from numba.core.registry import CPUDispatcher, cpu_target
-    from numba.core.targetconfig import TargetConfig
 
     _NEEDED = (
         (CPUDispatcher, ("compile", "add_overload", "get_call_template", "get_overload")),
         (CompileResult, ("_reduce", "_rebuild", "_replace")),
-        (TargetConfig, ("__hash__", "__eq__", "options")),
         (serialize, ("dumps",)),
         (sigutils, ("normalize_signature",)),
-        (types.Function, ("get_call_type",)),
     )
 except ImportError:  # another numba: see the module's text
     CPUDispatcher: Any = object  # type: ignore[no-redef]
@@ -61,8 +56,8 @@ except ImportError:  # another numba: see the module's text
 
 AVAILABLE = (
     numba.__version__.startswith(TRIED)
-    and bool(_NEEDED and NEEDED)
-    and all(hasattr(place, name) for place, names in (*_NEEDED, *NEEDED) for name in names)
+    and bool(_NEEDED and front_end.NEEDED and linking.NEEDED)
+    and all(hasattr(place, name) for place, names in (*_NEEDED, *front_end.NEEDED, *linking.NEEDED) for name in names)
 )
 """Whether this numba is one whose inner side is known."""
 
@@ -111,15 +106,12 @@ def forgiving(dispatcher: Any) -> Any:
     return dispatcher
 
 
-_NUMBERS = (types.Float, types.Integer, types.Boolean) if AVAILABLE else ()
-_known_operators: dict[Any, tuple[Any, Any]] = {}
-
-
 class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
     """A kernel: `overloads` are compiled for Python to call, `_lowered` for kernels to take in."""
 
     def __init__(self, py_func: Any, locals: Any = None, targetoptions: Any = None, **options: Any) -> None:
-        super().__init__(py_func, locals=locals, targetoptions=targetoptions, **options)
+        pipeline = front_end.KernelPipeline
+        super().__init__(py_func, locals, targetoptions, pipeline_class=pipeline, **options)
         self._lowered: dict[Any, Any] = {}
 
     def compile(self, sig: Any) -> Any:
@@ -207,54 +199,23 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
 @contextlib.contextmanager
 def _lowering() -> Iterator[None]:
     """Let numba make `KernelLibrary` of what it compiles; under its lock, so nothing of another thread is meant."""
-    cpu_target.target_context.refresh()  # numba's own runtime is a library too, and no kernel
     codegen: Any = cpu_target.target_context.codegen()
-    changed: Any = types.Function
     if "_library_class" in vars(codegen):  # within another
         yield
         return
+    cpu_target.target_context.refresh()  # numba's own runtime is a library too, and no kernel
     collecting = gc.isenabled()
     gc.disable()
-    changed.get_call_type = _operator_types
     codegen._library_class = KernelLibrary
     codegen.set_env = lambda name, environment: None  # until it is emitted it has no place for one
     try:
-        yield
+        with front_end.known_operators():
+            yield
     finally:
-        del codegen._library_class, codegen.set_env, changed.get_call_type
+        del codegen._library_class, codegen.set_env
         if collecting:
             gc.enable()
 
 
-def _operator_types(self: Any, context: Any, args: Any, kws: Any) -> Any:
-    """Return the types of a call as numba does; those of operators on numbers are looked for once, not at each use."""
-    of_numbers = all(type(argument) in _NUMBERS for argument in args)
-    if kws or not of_numbers or getattr(self.typing_key, "__module__", None) != operator.add.__module__:
-        return super(types.Function, self).get_call_type(context, args, kws)
-    known = _known_operators.get((id(self), args))
-    if known is None:
-        known = _known_operators[id(self), args] = (super(types.Function, self).get_call_type(context, args, kws), self)
-    return known[0]
-
-
-def _same_options(self: Any, other: Any) -> Any:
-    if not isinstance(other, TargetConfig):
-        return NotImplemented
-    mine, others = self._values, other._values
-    if mine == others:
-        return True
-    options = self.options
-    return options.keys() == other.options.keys() and all(
-        mine.get(name, options[name].default) == others.get(name, options[name].default)
-        for name in mine.keys() | others.keys()
-    )
-
-
-def _hash_of_options(self: Any) -> int:
-    return hash(type(self))
-
-
 if AVAILABLE:
-    _options: Any = TargetConfig
-    _options.__eq__ = _same_options  # as numba's, which builds a dictionary of all options each time
-    _options.__hash__ = _hash_of_options  # numba's hashes the names of the options, which are always the same
+    front_end.compare_options_quickly()

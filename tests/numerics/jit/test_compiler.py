@@ -204,3 +204,38 @@ def test_option_sets_compare_as_numbas_do():
     assert plain != other
     assert plain != "something else"
     assert TargetConfig.values(plain) == TargetConfig.values(stated)
+
+
+LLVM = """
+from collections import Counter
+import re
+import sys
+from replay.numerics.jit import front_end, linking
+if sys.argv[1] == "all passes":
+    front_end._LEFT_OUT = ()
+    front_end._known = type("Forgets", (dict,), {"get": lambda self, key: None})()
+emit = linking.KernelLibrary.emit
+def shown(library):
+    emit(library)
+    operations = re.findall(r"^  (?:%\\S+ = )?([a-z]+ \\w+)", str(library._final_module), re.M)
+    print(library.name, sorted(Counter(operations).items()))
+linking.KernelLibrary.emit = shown
+from replay.geometry import calipers, convexity
+from replay.numerics.jit import entries_of
+for each in (*entries_of(calipers), convexity._winds_once):
+    each.compile(each.declared)
+"""
+
+
+def test_what_is_left_out_before_llvm_changes_no_code(tmp_path):
+    """Kernels that allocate, sort and gather: operations as often as by all of numba's passes."""
+    found = []
+    for index, passes in enumerate(("all passes", "ours")):
+        cache = tmp_path / str(index)
+        cache.mkdir(mode=0o700)
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+        command = [sys.executable, "-c", LLVM, passes]
+        done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
+        found.append(done.stdout)
+    assert found[0] == found[1]
+    assert found[0].count("\n") == 2
