@@ -26,13 +26,16 @@ from replay.sensing.electrostatics.coupling import fill_influences, means_below,
 from replay.sensing.electrostatics.cut import cut, gathered
 from replay.sensing.electrostatics.nodes import place, placed_apart
 from replay.sensing.electrostatics.placement import RESOLVED, PosedBodies
-from replay.sensing.electrostatics.surveys import growing, trees
+from replay.sensing.electrostatics.surveys import PIECE, growing, trees
 from replay.sensing.electrostatics.unit import Unit
 
 _NODES = 400
 
 _COMMON = 1e-2
 """Share of a reading that both cuts may be off alike: rules of integration, grids (measured on the shared cases)."""
+
+_LOOKS = 16
+"""Poses of a block that decide into which pieces bodies are taken apart for E."""
 
 _FLOOR = 0.1
 """Share of the largest diagonal entry below which an entry's error does not ask for more nodes."""
@@ -67,9 +70,25 @@ class FieldSolver:
 
     def proxies(self, T: Floats) -> Floats:
         """Return E (n, k) [m] of n poses (n, bodies, 4, 4), see `keyframes`."""
-        nodes, survey = self._trees.nodes, self._trees.survey
-        body = self._body_of_shape[nodes.shape[survey]]
-        return self.potential.proxies(nodes.panels.centroid[survey], nodes.panels.area[survey], body, T, RESOLVED)
+        nodes = self._trees.nodes
+        which = self._pieces(T[np.linspace(0, len(T) - 1, min(len(T), _LOOKS)).round().astype(np.intp)])
+        body = self._body_of_shape[nodes.shape[which]]
+        return self.potential.proxies(nodes.panels.centroid[which], nodes.panels.area[which], body, T, RESOLVED)
+
+    def _pieces(self, T: Floats) -> Integers:
+        """Return nodes that the bodies consist of, none much larger than it is far from the unit in any of n poses."""
+        bodies = self._trees
+        panels, child = bodies.nodes.panels, bodies.nodes.child
+        done, waiting = [], np.arange(bodies.roots)
+        while len(waiting):
+            poses = T[:, self._body_of_shape[bodies.nodes.shape[waiting]]]
+            distance = self.potential.at(transforms.apply(poses, panels.centroid[waiting]).reshape(-1, 3))[1]
+            least = distance.reshape(len(T), -1).min(axis=0)
+            first = child[waiting]
+            small = (first < 0) | (first >= bodies.known) | (panels.diameter[waiting] <= np.maximum(PIECE, least))
+            done.append(waiting[small])
+            waiting = np.concatenate([first[~small], first[~small] + 1])
+        return np.concatenate(done)
 
     def read(self, placement: PosedBodies) -> BemReading | None:
         """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer."""

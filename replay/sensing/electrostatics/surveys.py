@@ -24,7 +24,7 @@ _CELLS = 5.0
 """Divisions of edges in the grids that trees end in, before anything is halved: fine where charge gathers."""
 
 _SURVEY = 1200
-_PIECE = 0.025
+PIECE = 0.025
 """Bodies are looked at in up to so many pieces, which need not be smaller than this [m]."""
 
 _KEPT = 6
@@ -70,7 +70,7 @@ class Trees:
         nodes = self.nodes
         heap = [(-nodes.panels.diameter[k], k) for k in range(int(nodes.made[0])) if nodes.child[k] < 0]
         heapq.heapify(heap)
-        while len(heap) < _SURVEY and -heap[0][0] > _PIECE:
+        while len(heap) < _SURVEY and -heap[0][0] > PIECE:
             _, k = heapq.heappop(heap)
             first = first_child(nodes, k)
             for c in (first, first + 1):
