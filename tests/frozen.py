@@ -29,7 +29,7 @@ RULES = Path(__file__).parents[1] / "scenarios" / "rules.yaml"
 EVERY = 4
 CONCAVE = ("arm/bow", "tool/bracket")
 SCENE = "scene"
-OWN_SCENES = {"capacitive.bem": "conductors"}
+OWN_SCENES = {"capacitive.bem": "conductors", "capacitive.field": "conductors"}
 """Versions that are asked of a scene of their own."""
 
 

@@ -123,7 +123,11 @@ def test_a_block_asked_for_alone_is_the_same() -> None:
 
 @pytest.mark.parametrize(
     ("method", "below", "duration", "shorter"),
-    [("tree", "2.35 V", "4 s", "2.5 s"), ("bem", "1.25 V", "0.1 s", "0.084 s")],
+    [
+        ("tree", "2.35 V", "4 s", "2.5 s"),
+        ("field", "1.25 V", "0.1 s", "0.084 s"),
+        ("bem", "1.25 V", "0.1 s", "0.084 s"),
+    ],
 )
 def test_what_comes_before_does_not_depend_on_what_comes_after(method, below, duration, shorter) -> None:
     guards = f"  near: {{when: {{capacitive: pad, output: {{below: {below}}}}}, stop: [cart]}}\n"

@@ -311,6 +311,7 @@ Voltage = Annotated[float, Quantity("Voltage", VOLTAGE, at_least=-1e6, at_most=1
 Supply = Annotated[float, Quantity("Supply", VOLTAGE, at_least=1e-6, at_most=1e6)]
 Probability = Annotated[float, Quantity("Probability", SHARE, at_least=0.0, at_most=1.0)]
 Share = Annotated[float, Quantity("Share", NUMBER, at_least=1e-3, at_most=1.0)]
+Accuracy = Annotated[float, Quantity("Accuracy", SHARE, at_least=1e-3, at_most=0.5)]
 Scale = Annotated[float, Quantity("Scale", NUMBER, at_least=1e-9, at_most=1e9)]
 AxisScale = Annotated[float, Quantity("AxisScale", NUMBER, at_least=-1e9, at_most=1e9)]
 

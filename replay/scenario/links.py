@@ -162,5 +162,5 @@ class LinkPart(Part):
     shapes: dict[Name, Shape] = Field(default_factory=dict)
     """Shapes by name."""
     earth: Earth = math.inf
-    """How the link is connected to earth, for the capacitive method bem: grounded, floating, or through a
+    """How the link is connected to earth, for the capacitive methods field and bem: grounded, floating, or through a
     capacitance [F] of what is not modelled (shoes, a mattress)."""

@@ -7,7 +7,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StrictInt, model_validator
 
 from replay.language.fields import Flag, Glob, Name, Part, Pose, Size2, When, in_order, needs_one
-from replay.language.units import NUMBER, Capacitance, Permittivity, Quantity, StrayCapacitance, Supply, Voltage
+from replay.language.units import (
+    NUMBER,
+    Accuracy,
+    Capacitance,
+    Permittivity,
+    Quantity,
+    StrayCapacitance,
+    Supply,
+    Voltage,
+)
 from replay.sensing.kind import Method
 from replay.sensing.signal.part import VoltageSignal
 
@@ -19,7 +28,7 @@ VACUUM_PERMITTIVITY = 8.8541878128e-12
 SUPPLY = 2.5
 """Supply voltage [V] of a sensor of which none is stated."""
 
-ELECTROSTATIC = ("bem",)
+ELECTROSTATIC = ("field", "bem")
 """The methods that compute charges on conductors."""
 
 
@@ -52,7 +61,8 @@ class CapacitiveSensorPart(Part):
     faces: Literal["all", "facing"] = "all"
     """"facing" counts only triangles whose outside faces the plate."""
     back: tuple[Name, ...] = ()
-    """Shapes of the sensor's link that are a conductor behind the plates; only for the method bem."""
+    """Shapes of the sensor's link that are a conductor behind the plates; only for the methods field and
+    bem."""
     driven: Flag = False
     """Whether what is behind the plates has their voltage, as a guard electrode, and not 0 V."""
     ignore: tuple[Glob, ...] = ()
@@ -64,22 +74,27 @@ class CapacitiveSensorPart(Part):
 class CapacitiveMethod(Method):
     """How capacitive sensors are computed."""
 
-    method: Literal["tree", "exact", "midpoint", "bem"] = "tree"
+    method: Literal["tree", "exact", "midpoint", "field", "bem"] = "tree"
     """A tree that meets a tolerance, every triangle in closed form, or the thesis's midpoint splitting: the thesis's
-    model. Or the electrostatics of conductors: bem, by boundary elements."""
+    model. Or the electrostatics of conductors: field, fast and with an error that is told, or bem, the reference."""
     rtol: Tolerance | None = None
     """Relative tolerance of the sum; only for method tree, 1e-6 when left out."""
     splits: Annotated[StrictInt, Field(ge=0, le=8)] | None = None
     """Each triangle is split into 4^splits; only for method midpoint, 4 when left out."""
     drive: Literal["alone", "together"] | None = None
     """Whether output voltages are those of one sensor of a link driven at a time, or of all of them at once; only for
-    method bem, alone when left out."""
+    methods field and bem, alone when left out."""
+    accuracy: Accuracy | None = None
+    """Share of a reading that its error may be before more unknowns are taken, and thrice what splines between frames
+    may miss; only for method field, 3 % when left out."""
 
     @model_validator(mode="after")
     def _options_belong(self) -> Self:
         self._belongs("tree", "rtol")
         self._belongs("midpoint", "splits")
-        self._belongs("bem", "drive")
+        self._belongs("field", "accuracy")
+        if self.method not in ELECTROSTATIC:
+            self._belongs("field or bem", "drive")
         return self
 
     def options(self) -> dict[str, Any]:
@@ -89,7 +104,9 @@ class CapacitiveMethod(Method):
         if self.method == "midpoint":
             return {"splits": 4 if self.splits is None else self.splits}
         if self.method in ELECTROSTATIC:
-            return {"drive": self.drive or "alone"}
+            return {"drive": self.drive or "alone"} | (
+                {"accuracy": 0.03 if self.accuracy is None else self.accuracy} if self.method == "field" else {}
+            )
         return {}
 
 

@@ -18,7 +18,7 @@ from replay.errors import InvalidValue
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics.body import ConductorBody
-from replay.sensing.electrostatics.unit import Electrode, Unit
+from replay.sensing.electrostatics.unit import MOST_PANELS, Electrode, Unit
 from replay.sensing.target import Target
 
 FOUR_PI_EPSILON = 1.1126500560536183e-10
@@ -65,12 +65,15 @@ class Station:
         return np.ascontiguousarray(np.concatenate([*self.plates, self.behind]))
 
 
-def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station, ...]:
+def stations(
+    sensors: Sequence[Any], targets: Sequence[Target], *, most_panels: int = MOST_PANELS
+) -> tuple[Station, ...]:
     """Return the sensors of a scene as units, in the order of their links.
 
     Args:
         sensors: as `sensing.capacitive.sensor.CapacitiveSensor`.
         targets: the sensed shapes.
+        most_panels: of a unit's meshes, see `unit.Unit`.
 
     Raises:
         InvalidValue: sensors of one link that ignore other links, or drive what is behind them differently.
@@ -111,7 +114,7 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station
                 plates=plates,
                 behind=behind,
                 driven=first.driven,
-                unit=kept_unit(electrodes),
+                unit=kept_unit(electrodes, most_panels),
                 bodies=tuple(bodies),
                 links=tuple(links),
                 objects=np.array(objects, dtype=np.intp),
@@ -123,16 +126,16 @@ def stations(sensors: Sequence[Any], targets: Sequence[Target]) -> tuple[Station
 _units: OrderedDict[bytes, Unit] = OrderedDict()
 
 
-def kept_unit(electrodes: Sequence[Electrode]) -> Unit:
+def kept_unit(electrodes: Sequence[Electrode], most_panels: int = MOST_PANELS) -> Unit:
     """Return a unit; one that this process made of the same surfaces comes with what was computed of it."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(f"{most_panels}".encode())
     for electrode in electrodes:
         digest.update(f"{len(electrode.surfaces)}".encode())
         for surface in electrode.surfaces:
             digest.update(f" {len(surface)} ".encode() + np.ascontiguousarray(surface).tobytes())
     key = digest.digest()
     if key not in _units:
-        _units[key] = Unit(electrodes)
+        _units[key] = Unit(electrodes, most_panels=most_panels)
         while len(_units) > _KEPT_UNITS:
             _units.popitem(last=False)
     _units.move_to_end(key)

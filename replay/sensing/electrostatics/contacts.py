@@ -110,7 +110,9 @@ def _conductors(station: Station, T: Floats) -> Integers:
                     touch |= gaps(surface, np.ascontiguousarray(relative), triangles, tree, TOUCHING)[:, 0] < TOUCHING
             for i in np.flatnonzero(touch):
                 result[i, result[i] == result[i, b]] = result[i, a]
-    return np.stack([np.unique(row, return_inverse=True)[1] for row in result])
+    for i in np.flatnonzero((result != np.arange(count)).any(axis=1)):
+        result[i] = np.unique(result[i], return_inverse=True)[1]
+    return result
 
 
 def _placed(

@@ -98,7 +98,8 @@ def potential_at(point: Triple, panels: Panels, j: int) -> float:
 
 
 @leaf_kernel
-def _point(panels: Panels, i: int, a: float, b: float) -> Triple:
+def point_on(panels: Panels, i: int, a: float, b: float) -> Triple:
+    """Return the point origin + a u + b v of panel i."""
     origin, u, v = panels.origin, panels.u, panels.v
     return (
         origin[i, 0] + a * u[i, 0] + b * v[i, 0],
@@ -123,7 +124,7 @@ def _near(small: Panels, i: int, large: Panels, j: int) -> float:
                 if few
                 else (_TRIANGLE_7[k, 0], _TRIANGLE_7[k, 1], _TRIANGLE_7[k, 2])
             )
-        total += weight * potential_at(_point(small, i, a, b), large, j)
+        total += weight * potential_at(point_on(small, i, a, b), large, j)
     return total
 
 
@@ -133,10 +134,10 @@ def _middle(first: Panels, i: int, second: Panels, j: int) -> float:
     total = 0.0
     for k in range(m):
         a, b = (_FOUR_4[k, 0], _FOUR_4[k, 1]) if m == 4 else (_TRIANGLE_3[k, 0], _TRIANGLE_3[k, 1])
-        x, y, z = _point(first, i, a, b)
+        x, y, z = point_on(first, i, a, b)
         for l in range(n):
             a, b = (_FOUR_4[l, 0], _FOUR_4[l, 1]) if n == 4 else (_TRIANGLE_3[l, 0], _TRIANGLE_3[l, 1])
-            X, Y, Z = _point(second, j, a, b)
+            X, Y, Z = point_on(second, j, a, b)
             total += 1.0 / math.sqrt((x - X) * (x - X) + (y - Y) * (y - Y) + (z - Z) * (z - Z))
     return total / (m * n)
 
@@ -180,6 +181,18 @@ def mean_potentials(panels: Panels, sources: Panels, charges: Floats) -> Floats:
             for c in range(k):
                 result[c, i] += charges[c, j] * value
     return result
+
+
+@leaf_kernel
+def over_points(x: float, y: float, z: float, sources: Panels, j: int) -> float:
+    """Return the mean of 1/r from a point over the points that stand for panel j."""
+    n = 4 if sources.four[j] else 3
+    total = 0.0
+    for k in range(n):
+        a, b = (_FOUR_4[k, 0], _FOUR_4[k, 1]) if n == 4 else (_TRIANGLE_3[k, 0], _TRIANGLE_3[k, 1])
+        X, Y, Z = point_on(sources, j, a, b)
+        total += 1.0 / math.sqrt((x - X) * (x - X) + (y - Y) * (y - Y) + (z - Z) * (z - Z))
+    return total / n
 
 
 @entry(float64[:, ::1], PANELS_TYPE, float64[:, ::1])

@@ -13,7 +13,7 @@ from replay.numerics.jit import entry, kernel
 from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.influence import point_potentials
 from replay.sensing.electrostatics.panels import joined
-from replay.sensing.electrostatics.placement import RESOLVED, PosedBodies
+from replay.sensing.electrostatics.placement import RESOLVED
 from replay.sensing.electrostatics.refinement import bounded
 from replay.sensing.electrostatics.unit import Unit
 
@@ -56,9 +56,9 @@ class Proxy:
             self._points.append(pieces.centroid)
             self._areas.append(pieces.area)
 
-    def of(self, placement: PosedBodies) -> Floats:
-        """Return E (k,) [m], > 0, of one pose."""
-        turned = [transforms.apply(pose, points) for points, pose in zip(self._points, placement.poses, strict=True)]
+    def of(self, poses: Floats) -> Floats:
+        """Return E (k,) [m], > 0, of one pose (bodies, 4, 4)."""
+        turned = [transforms.apply(pose, points) for points, pose in zip(self._points, poses, strict=True)]
         points = np.ascontiguousarray(np.concatenate(turned))
         coarse = self._unit.charged[0]
         phi = point_potentials(points, coarse.panels, coarse.charges)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,17 +14,36 @@ from replay.numerics.arrays import Flags, Floats
 from replay.numerics.jit import entries_of
 from replay.sensing.capacitive.columns import CapacitiveColumns
 from replay.sensing.capacitive.part import VACUUM_PERMITTIVITY
-from replay.sensing.electrostatics import bem, cholesky, circuit, gap, influence, products, proxy
+from replay.sensing.electrostatics import (
+    bem,
+    cholesky,
+    circuit,
+    coupling,
+    cut,
+    gap,
+    influence,
+    nodes,
+    potential_grid,
+    products,
+    proxy,
+)
+from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.circuit import output_voltages
 from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON, Station, stations
-from replay.sensing.electrostatics.contacts import Stand, stand
+from replay.sensing.electrostatics.contacts import stand
+from replay.sensing.electrostatics.field import FieldSolver
 from replay.sensing.electrostatics.keyframes import between_keys, pieces
 from replay.sensing.electrostatics.motion import PoseTrack, Solved
+from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.proxy import Proxy
+from replay.sensing.electrostatics.unit import MOST_PANELS, Unit
 from replay.sensing.target import Target
 
 _TOLERANCE = 5e-3
 """Largest share of a reading by which a spline between frames that are solved may miss."""
+
+PANELS = {"bem": MOST_PANELS, "field": 3000}
+"""The most panels of a unit's own meshes, by method."""
 
 FEW = 5
 """Poses that are solved without asking whether splines would do."""
@@ -32,7 +51,34 @@ FEW = 5
 
 def kernels(*, method: str, savings: bool = True, **_options: Any) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `ElectrostaticSuite`."""
-    return entries_of(containment, influence, cholesky, products, gap, circuit, proxy)
+    shared = entries_of(containment, influence, cholesky, products, gap, circuit, proxy)
+    return (*shared, *entries_of(cut, nodes, coupling, potential_grid)) if method == "field" else shared
+
+
+class Solver(Protocol):
+    """What solves the poses of bodies before a unit."""
+
+    def read(self, placement: PosedBodies) -> bem.BemReading | None:
+        """Return what bodies change in one pose; None where there is no answer."""
+
+    def proxies(self, T: Floats) -> Floats:
+        """Return E (n, k) [m] of n poses (n, bodies, 4, 4), see `keyframes`."""
+
+
+class Reference:
+    """Solves by `bem`; arguments as of `proxy.Proxy`."""
+
+    def __init__(self, unit: Unit, surface: Floats, bodies: tuple[ConductorBody, ...]) -> None:
+        self._unit = unit
+        self._proxy = Proxy(unit, surface, bodies)
+
+    def read(self, placement: PosedBodies) -> bem.BemReading | None:
+        """See `Solver`."""
+        return bem.read(self._unit, placement)
+
+    def proxies(self, T: Floats) -> Floats:
+        """See `Solver`."""
+        return np.stack([self._proxy.of(poses) for poses in T])
 
 
 class ElectrostaticSuite:
@@ -44,10 +90,11 @@ class ElectrostaticSuite:
     Args:
         sensors: in the order of the columns.
         targets: the sensed shapes, in the order of `per_object`.
-        method: "bem".
+        method: "field", or "bem".
         drive: "alone": output voltages with one sensor of a unit driven at a time; "together": with all of them.
+        accuracy: of "field": error, as a share of a reading, from which on more unknowns are taken.
         savings: False solves every frame anew; else readings of frames between those that are solved are splines, and
-            `error` holds what that costs, at most about 0.5 % (`keyframes`).
+            `error` holds what that costs, at most about 0.5 %, of "field" a third of `accuracy` (`keyframes`).
         watched: names of sensors whose units are solved in every frame: what they read must not depend on later ones.
 
     Attributes:
@@ -64,17 +111,20 @@ class ElectrostaticSuite:
         sensors: Sequence[Any],
         targets: Sequence[Target],
         *,
-        method: str = "bem",
+        method: str = "field",
         drive: str = "alone",
+        accuracy: float = 0.03,
         savings: bool = True,
         watched: frozenset[str] = frozenset(),
     ) -> None:
         self.sensors = tuple(sensors)
         self.targets = tuple(targets)
         self.method = method
-        self.stations = stations(self.sensors, self.targets)
+        self.stations = stations(self.sensors, self.targets, most_panels=PANELS[method])
         self.solved = 0
-        self._proxy: dict[int, Proxy] = {}
+        self._accuracy = accuracy
+        self._tolerance = accuracy / 3.0 if method == "field" else _TOLERANCE
+        self._solvers: dict[int, Solver] = {}
         self._together = drive == "together"
         self._savings = savings
         self._watched = watched
@@ -115,29 +165,36 @@ class ElectrostaticSuite:
         standing = stand(station, targets, np.ascontiguousarray(track.poses))
         readings: dict[int, bem.BemReading | None] = {}
 
+        solver = self._solver(station)
+
         def solve(pose: int) -> bem.BemReading | None:
             if pose not in readings:
-                readings[pose] = bem.read(station.unit, standing.placements[pose])
+                readings[pose] = solver.read(standing.placements[pose])
                 self.solved += 1
             return readings[pose]
 
         if splines and len(track.poses) > FEW:
+            placed = np.array([placement.poses for placement in standing.placements])
             found = between_keys(
                 lambda frame: solve(int(track.pose_of[frame])),
-                self._proxies(station, standing)[track.pose_of],
-                pieces(_outlines(standing)[track.pose_of], standing.states[track.pose_of]),
-                _TOLERANCE,
+                solver.proxies(placed)[track.pose_of],
+                pieces(_outlines(station.bodies, placed)[track.pose_of], standing.states[track.pose_of]),
+                self._tolerance,
             )
             if found is not None:
                 touching, unresolved = standing.touching[track.pose_of], standing.unresolved[track.pose_of]
                 return Solved(found.increase, found.error, found.shares, touching, unresolved)
         return Solved.of(standing, [solve(pose) for pose in range(len(track.poses))], k)[track.pose_of]
 
-    def _proxies(self, station: Station, standing: Stand) -> Floats:
-        """Return E (n, k) of each pose."""
-        if station.link not in self._proxy:
-            self._proxy[station.link] = Proxy(station.unit, station.surface, station.bodies)
-        return np.stack([self._proxy[station.link].of(placement) for placement in standing.placements])
+    def _solver(self, station: Station) -> Solver:
+        """Return what solves the poses of a unit."""
+        if station.link not in self._solvers:
+            self._solvers[station.link] = (
+                FieldSolver(station.unit, station.bodies, behind=station.has_back, accuracy=self._accuracy)
+                if self.method == "field"
+                else Reference(station.unit, station.surface, station.bodies)
+            )
+        return self._solvers[station.link]
 
     def _fill(self, columns: CapacitiveColumns, station: Station, solved: Solved) -> None:
         """Write the readings of one unit."""
@@ -179,17 +236,10 @@ class ElectrostaticSuite:
         columns.delta_output[:, at] = supply - voltage
 
 
-def _outlines(standing: Stand) -> Floats:
-    """Return corners of boxes around the bodies (n, 8 bodies, 3) [m] in each pose, in the unit's frame."""
-    boxes = [
-        _box(np.concatenate([shape.reshape(-1, 3) for shape in body.shapes])) for body in standing.placements[0].bodies
-    ]
-    return np.stack(
-        [
-            np.concatenate([transforms.apply(pose, box) for pose, box in zip(placement.poses, boxes, strict=True)])
-            for placement in standing.placements
-        ]
-    )
+def _outlines(bodies: Sequence[ConductorBody], T: Floats) -> Floats:
+    """Return corners of boxes around bodies (n, 8 bodies, 3) [m] in poses (n, bodies, 4, 4)."""
+    boxes = np.stack([_box(np.concatenate([shape.reshape(-1, 3) for shape in body.shapes])) for body in bodies])
+    return np.asarray(transforms.apply(T[:, :, None], boxes)).reshape(len(T), -1, 3)
 
 
 def _box(points: Floats) -> Floats:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from replay.sensing.electrostatics.faces import OPEN, Faces, faces_of
 from replay.sensing.electrostatics.grading import cut_nodes, graded, grid
 from replay.sensing.electrostatics.influence import fill_influences, mean_potentials
 from replay.sensing.electrostatics.panels import Panels, chosen, joined
+from replay.sensing.electrostatics.potential_grid import Potential
 from replay.sensing.electrostatics.products import products
 from replay.sensing.electrostatics.refinement import near_tree, point_sample, refined
 
@@ -42,7 +44,7 @@ _NEAR = 0.25
 """A plate is near a face behind it when their distance is below this share of its shorter edge."""
 
 MOST_PANELS = 6000
-"""Of the finer mesh; beyond, both are made coarser."""
+"""Of the finer mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +80,15 @@ class Unit:
 
     Args:
         electrodes: at least one, each with a surface that has area.
+        most_panels: of the finer mesh that phi comes from; beyond, both are made coarser.
 
     Raises:
         InvalidValue: an electrode without area, or electrodes that touch each other.
     """
 
-    def __init__(self, electrodes: Sequence[Electrode]) -> None:
+    def __init__(self, electrodes: Sequence[Electrode], *, most_panels: int = MOST_PANELS) -> None:
         self.electrodes = tuple(electrodes)
+        self._most_panels = most_panels
         self._faces = [[faces_of(surface) for surface in electrode.surfaces] for electrode in self.electrodes]
         for electrode, found in zip(self.electrodes, self._faces, strict=True):
             if not found or not all(len(faces.panels.area) for faces in found):
@@ -125,7 +129,7 @@ class Unit:
     def charged(self) -> tuple[Charged, Charged]:
         """The coarser and the finer mesh that phi comes from."""
         scale = 1.0
-        while len(self.mesh(scale * FINENESSES[1])[1]) > MOST_PANELS:
+        while len(self.mesh(scale * FINENESSES[1])[1]) > self._most_panels:
             scale *= 1.2
         coarse, fine = (self._charged(scale * fineness) for fineness in FINENESSES)
         return coarse, fine
@@ -134,12 +138,22 @@ class Unit:
     def matrix(self) -> Floats:
         """Maxwell's capacitances (k, k) [m] of the unit alone, extrapolated."""
         coarse, fine = self.charged
-        return fine.matrix + (fine.matrix - coarse.matrix) / _GAIN
+        return np.asarray(self.extrapolated(coarse.matrix, fine.matrix))
 
     def potential(self, panels: Panels) -> tuple[Floats, Floats]:
         """Return the mean potentials (k, n) on panels, each electrode alone at 1 V: extrapolated, and the fine one."""
         first, second = (mean_potentials(panels, mesh.panels, mesh.charges) for mesh in self.charged)
-        return second + (second - first) / _GAIN, second
+        return self.extrapolated(first, second), second
+
+    @cached_property
+    def around(self) -> Potential:
+        """The potential around the unit, at any point."""
+        return Potential(self)
+
+    @staticmethod
+    def extrapolated(coarse: Any, fine: Any) -> Any:
+        """Return what potentials of both meshes say of a mesh without end."""
+        return fine + (fine - coarse) / _GAIN
 
     def _charged(self, fineness: float) -> Charged:
         panels, electrode = self.mesh(fineness)

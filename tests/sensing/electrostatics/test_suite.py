@@ -36,13 +36,17 @@ sensors:
   capacitive:
     left: {{link: sensor, plates: {{a: {{size: [0.04, 0.04], pose: {{xyz: [-0.03, 0, 0]}}}}}}, coupling: 1e-11, {own}}}
     right: {{link: sensor, plates: {{a: {{size: [4 cm, 4 cm], pose: {{xyz: [0.03, 0, 0]}}}}}}, coupling: 10 pF{other}}}
-model: {{capacitive: {{method: bem{model}}}}}
+model: {{capacitive: {{method: {method}{model}}}}}
 """
 
 
-@pytest.fixture(autouse=True)
-def coarse_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is asked here is not how exact a reading is."""
+METHOD = "bem"
+
+
+@pytest.fixture(autouse=True, params=["bem", "field"])
+def coarse_meshes(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both methods; what is asked here is not how exact a reading is."""
+    monkeypatch.setitem(globals(), "METHOD", request.param)
     monkeypatch.setattr(bem, "LEVELS", (3.0, 2.1, 1.5))
     monkeypatch.setattr(unit, "FINENESSES", (2.0, 1.4))
 
@@ -57,7 +61,7 @@ def write(folder: Path, **given: str) -> Path:
         "model": "",
     } | given
     path = folder / "plate.yaml"
-    path.write_text(SCENARIO.format(own=values.pop("sensor"), **values))
+    path.write_text(SCENARIO.format(own=values.pop("sensor"), method=METHOD, **values))
     return path
 
 
@@ -73,7 +77,7 @@ def test_a_reading_is_the_sensor_alone_and_what_bodies_add_which_is_the_sum_of_t
     found, floating = read(tmp_path, **given), read(tmp_path, earth="floating", **given)
     assert found.increase is not None and floating.increase is not None and found.error is not None
     assert found.per_object[0].sum(axis=1) == pytest.approx(found.increase[0], rel=1e-9)
-    assert (found.increase[0, 0] > 2.0 * found.increase[0, 1] > 0.0) and (found.error < 0.02 * found.increase).all()
+    assert (found.increase[0, 0] > 2.0 * found.increase[0, 1] > 0.0) and (found.error < 0.03 * found.increase).all()
     assert (floating.increase < found.increase).all()
     alone = found.capacitance - found.increase
     assert alone == pytest.approx(floating.capacitance - floating.increase, rel=1e-12)
@@ -177,12 +181,12 @@ def test_notes_say_what_is_one_unit_and_how_bodies_are_earthed(tmp_path: Path) -
 def test_a_recording_has_the_columns_and_one_of_another_method_has_not(tmp_path: Path) -> None:
     scenario = replay.load(write(tmp_path))
     columns: dict[str, Any] = {}
-    for name, model in (("bem", None), ("tree", type(scenario.model)())):
+    for name, model in (("own", None), ("tree", type(scenario.model)())):
         recorded = replay.record(scenario, tmp_path / name, model=model, rrd=False)
         columns[name] = replay.read(recorded.mcap).capacitive
-    assert columns["bem"].increase.shape == (1, 2) and not columns["bem"].unresolved.any()
+    assert columns["own"].increase.shape == (1, 2) and not columns["own"].unresolved.any()
     assert columns["tree"].increase is None and columns["tree"].unresolved is None
-    difference = replay.diff(tmp_path / "tree" / "plate.mcap", tmp_path / "bem" / "plate.mcap")
+    difference = replay.diff(tmp_path / "tree" / "plate.mcap", tmp_path / "own" / "plate.mcap")
     assert difference.verdict.name == "DIFFERENT"
 
 
