@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import random
 import re
@@ -91,13 +92,18 @@ def paths(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [path, *(found for key, below in items for found in paths(below, (*path, key)))]
 
 
+def stray(rng: random.Random) -> Any:
+    """Return a value that belongs nowhere, as one of its own: what it is put into may be damaged once more."""
+    return copy.deepcopy(rng.choice(STRAY))
+
+
 def of_values(value: Any, rng: random.Random) -> Any:
     """Return JSON values of which one or two are removed, replaced or moved."""
     value = json.loads(json.dumps(value))
     for _ in range(rng.choice((1, 1, 2))):
         places = [path for path in paths(value) if path]
         if not places:
-            return rng.choice(STRAY)
+            return stray(rng)
         path = rng.choice(places)
         owner = value
         for step in path[:-1]:
@@ -111,9 +117,9 @@ def of_values(value: Any, rng: random.Random) -> Any:
                     other = other[step]
                 owner[path[-1]] = json.loads(json.dumps(other))
             case 2 if isinstance(owner, dict):
-                owner[rng.choice(("x", "", "a" * 300, "\x1b[2J"))] = rng.choice(STRAY)
+                owner[rng.choice(("x", "", "a" * 300, "\x1b[2J"))] = stray(rng)
             case _:
-                owner[path[-1]] = rng.choice(STRAY)
+                owner[path[-1]] = stray(rng)
     return value
 
 
