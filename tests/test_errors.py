@@ -62,6 +62,14 @@ ERRORS: list[tuple[type[ReplayError], tuple, dict, str, dict, tuple[type, ...]]]
         (),
     ),
     (
+        errors.UndeterminedClockError,
+        (Problem("offset cannot be estimated", file="a.yaml", line=3), "it is periodic", (0.5, 1.5)),
+        {},
+        "a.yaml:3: offset cannot be estimated",
+        {"reason": "it is periodic", "candidates": (0.5, 1.5)},
+        (),
+    ),
+    (
         errors.LimitError,
         ("a.mcap", "is large"),
         {},

@@ -32,6 +32,7 @@ from replay.simulation import FrameBlock, Simulation
 SCENES = (
     "carm_bodyguard",
     "carm_parking",
+    "carm_parking_measured",
     "experiments/parallel_10cm",
     "doctor_walks_in",
     "panda_meets_person",
