@@ -44,7 +44,7 @@ FILE = PathName()
 @click.option("--overwrite", is_flag=True, help="Replace a part that was changed by hand.")
 @format_option
 def import_(description: Path, output: Path, form: str, samples: int | None, **given: Any) -> ExitCode:
-    """Write the robot of a URDF or MJCF file DESCRIPTION as a part, with what is not as it says (exit code 3).
+    """Write the robot of a URDF file DESCRIPTION as a part of the language, with what is not as it says (exit code 3).
 
     Files of package:// are looked for in --package, then beside the description, then where ROS says.
     """

@@ -16,12 +16,13 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, PlainValidator, ValidationError, WithJsonSchema
 
 from replay.comparison.rules import Rule, Rules, Tolerance
-from replay.errors import InvalidValue, Problem, ScenarioError
+from replay.errors import InvalidValue, ScenarioError
 from replay.language.fields import Flag, Part, Text, rejected
+from replay.language.node import Node
 from replay.language.units import TIME, Quantity
 from replay.scenario.problems import translate
-from replay.scenario.source import Folder, SourceRule, locate
-from replay.scenario.yaml_text import Node, parse
+from replay.scenario.source import locate
+from replay.scenario.yaml_file import read_yaml
 
 SCHEMA_FILE: Final = "rules.schema.json"
 
@@ -154,18 +155,10 @@ def read_rules(path: str | Path, *, today: datetime.date | None = None) -> Rules
         ScenarioError: everything that is wrong, each with file, line and column.
         InvalidValue: a rule expires and `today` is not given.
     """
-    library = Folder(Path(path))
-    shown = library.shown(library.main)
-    problems: list[Problem] = []
-    try:
-        root = parse(library.read(library.main), shown, problems)
-    except SourceRule as error:
-        raise ScenarioError([Problem(str(error), file=shown)]) from None
-    if root is None or problems:
-        raise ScenarioError(problems)
+    root = read_yaml(Path(path))
     rules = _validated(root)
     if today is None and any(rule.expires is not None for rule in rules):
-        raise InvalidValue("today", None, f"must be a date, because rules in {shown} expire")
+        raise InvalidValue("today", None, f"must be a date, because rules in {root.place.file} expire")
     return Rules.on(today or datetime.date.min, rules)
 
 

@@ -1,1 +1,1 @@
-"""Descriptions of robots (URDF, SRDF, MJCF) to parts that scenarios include; `replay import` alone calls it."""
+"""Descriptions of robots (URDF, SRDF) to parts that scenarios include; `replay import` alone calls it."""

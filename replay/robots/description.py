@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from replay.robots.xml_text import XmlElement
@@ -11,19 +10,12 @@ from replay.robots.xml_text import XmlElement
 Triple = tuple[float, float, float]
 
 
-def triple(values: Iterable[float]) -> Triple:
-    """Return three numbers as such."""
-    x, y, z = map(float, values)
-    return x, y, z
-
-
 @dataclass(frozen=True)
 class Origin:
-    """A pose in the frame of what carries it: xyz [m], and roll, pitch, yaw [rad] R = Rz Ry Rx, or a quaternion."""
+    """A pose in the frame of what carries it: xyz [m], and roll, pitch, yaw [rad] with R = Rz Ry Rx."""
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)
-    quat_xyzw: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -31,9 +23,8 @@ class Geometry:
     """A shape of a description.
 
     Attributes:
-        kind: box, cylinder, sphere, capsule, ellipsoid, plane or mesh.
-        sizes: edge lengths of a box or plane; radius and length of a cylinder or capsule; radius of a sphere, or the
-            three of an ellipsoid [m].
+        kind: box, cylinder, sphere, capsule or mesh.
+        sizes: edge lengths of a box; radius and length of a cylinder or capsule; radius of a sphere [m].
         file, scale: of a mesh, as written.
     """
 

@@ -13,7 +13,7 @@ from replay import limits
 from replay.errors import RecordingExistsError, RobotError, count
 from replay.language.units import ANGLE, LENGTH, quantity_rule
 from replay.logs.part_file import write_file
-from replay.robots import checking, joint_limits, mjcf, part_text, srdf, urdf, xml_text
+from replay.robots import checking, joint_limits, part_text, srdf, urdf
 from replay.robots.description import Origin, RobotChange, Triple
 from replay.robots.meshes import RobotMeshes
 from replay.robots.packages import Packages, given
@@ -99,7 +99,7 @@ def run(description: Path, output: Path, options: Options) -> Imported:
     """Read a robot and write it as a part.
 
     Args:
-        description: a URDF or MJCF file.
+        description: a URDF file.
         output: the part.
         options: see there.
 
@@ -114,13 +114,8 @@ def run(description: Path, output: Path, options: Options) -> Imported:
         raise RobotError(str(output), "is to be a part, whose name ends in .yaml")
     _may_write(output, options.overwrite)
     data = _read(description)
-    root = xml_text.parse(description, data, root=("robot", "mujoco"))
-    if root.tag == "mujoco":
-        robot, semantics = mjcf.read(description, root)
-    else:
-        robot, semantics = urdf.read(description, root), srdf.Semantics()
-    if options.srdf is not None:
-        semantics.add(srdf.read(options.srdf, _read(options.srdf), robot))
+    robot = urdf.read(description, data)
+    semantics = srdf.Semantics() if options.srdf is None else srdf.read(options.srdf, _read(options.srdf), robot)
     if options.limits is not None:
         joint_limits.limited(robot, options.limits, _read(options.limits))
     joint_limits.accelerated(robot, joint_limits.accelerations(options.acceleration))

@@ -89,8 +89,6 @@ def _pose(origin: Origin) -> Entry:
         entry["xyz"] = list(origin.xyz)
     if any(origin.rpy):
         entry["rpy"] = list(origin.rpy)
-    if origin.quat_xyzw is not None and any(origin.quat_xyzw[:3]):
-        entry["quat_xyzw"] = list(origin.quat_xyzw)
     return entry
 
 
@@ -216,10 +214,6 @@ def _shape(body: RobotBody, meshes: RobotMeshes) -> Entry:
     match geometry.kind:
         case "box":
             return {"type": "cuboid", "size": list(geometry.sizes)}
-        case "plane":
-            return {"type": "plane", "size": list(geometry.sizes)}
-        case "ellipsoid":
-            return {"type": "ellipsoid", "radii": list(geometry.sizes)} | _chord(max(geometry.sizes))
         case "sphere":
             return {"type": "sphere", "radius": geometry.sizes[0]} | _chord(geometry.sizes[0])
         case "capsule" if geometry.sizes[1] < SMALLEST:

@@ -29,12 +29,6 @@ class Semantics:
     states: dict[str, dict[str, float]] = field(default_factory=dict)
     changes: list[RobotChange] = field(default_factory=list)
 
-    def add(self, other: Semantics) -> None:
-        """Take over what another file says, which wins."""
-        self.disabled |= other.disabled
-        self.states |= other.states
-        self.changes += other.changes
-
 
 def read(path: Path, data: bytes, robot: Robot) -> Semantics:
     """Return what an SRDF file says of a robot; names that it does not have are told in `changes`.

@@ -20,10 +20,9 @@ from replay.robots.description import (
     RobotJoint,
     RobotLink,
     Triple,
-    triple,
 )
 from replay.robots.numbers import number, numbers, size
-from replay.robots.xml_text import XACRO, XmlElement
+from replay.robots.xml_text import XACRO, XmlElement, parse
 
 _TYPES = ("fixed", "revolute", "continuous", "prismatic", "floating", "planar")
 _OF_A_LINK = {"visual", "collision", "inertial"}
@@ -32,12 +31,13 @@ _OF_A_BODY = {"origin", "geometry", "material"}
 _UNUSED = "is not used: replay moves links along their scripts and knows no forces"
 
 
-def read(path: Path, root: XmlElement) -> Robot:
-    """Return the robot that a URDF file describes, given its root element.
+def read(path: Path, data: bytes) -> Robot:
+    """Return the robot that a URDF file describes.
 
     Raises:
-        RobotError: it contradicts itself: the first thing that is wrong, with its line.
+        RobotError: it is no URDF, or contradicts itself: the first thing that is wrong, with its line.
     """
+    root = parse(path, data, root="robot")
     changes: list[RobotChange] = []
     colors = _colors(root, changes)
     links: dict[str, RobotLink] = {}
@@ -146,7 +146,7 @@ def _mesh(element: XmlElement) -> Geometry:
     if len(element.attributes.get("scale", "").split()) == 1:
         scale = (number(element, "scale"),) * 3
     else:
-        scale = triple(numbers(element, "scale", 3, (1.0, 1.0, 1.0)))
+        scale = _triple(numbers(element, "scale", 3, (1.0, 1.0, 1.0)))
     if 0.0 in scale:
         raise element.wrong(f"<mesh> has scale={element.text('scale')!r}, which leaves it no extent")
     return Geometry("mesh", file=file, scale=scale)
@@ -160,7 +160,12 @@ def _origin(element: XmlElement) -> Origin:
     if written is None:
         return Origin()
     zero = (0.0, 0.0, 0.0)
-    return Origin(triple(numbers(written, "xyz", 3, zero)), triple(numbers(written, "rpy", 3, zero)))
+    return Origin(_triple(numbers(written, "xyz", 3, zero)), _triple(numbers(written, "rpy", 3, zero)))
+
+
+def _triple(values: tuple[float, ...]) -> Triple:
+    x, y, z = values
+    return x, y, z
 
 
 def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
@@ -177,7 +182,7 @@ def _joint(element: XmlElement, changes: list[RobotChange]) -> RobotJoint:
     axis: Triple = (1.0, 0.0, 0.0)
     written = element.first("axis")
     if written is not None and kind in ("revolute", "continuous", "prismatic"):
-        axis = triple(numbers(written, "xyz", 3, axis))
+        axis = _triple(numbers(written, "xyz", 3, axis))
         if math.hypot(*axis) < 1e-100:
             raise written.wrong(f"joint {name!r} has the axis {written.text('xyz')[:60]}, which has no direction")
     for tag, rule in (

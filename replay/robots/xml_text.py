@@ -45,13 +45,13 @@ class XmlElement:
         return value
 
 
-def parse(path: Path | str, data: bytes, *, root: str | tuple[str, ...]) -> XmlElement:
+def parse(path: Path | str, data: bytes, *, root: str) -> XmlElement:
     """Return the root element of an XML file.
 
     Args:
         path: the file, for errors.
         data: its bytes.
-        root: the tag that the root element must have, or those of which it must have one.
+        root: the tag that the root element must have.
 
     Raises:
         RobotError: it is no such file, is not well-formed, has a document type or is larger than what is read.
@@ -65,10 +65,8 @@ def parse(path: Path | str, data: bytes, *, root: str | tuple[str, ...]) -> XmlE
         stem = re.sub(r"(\.urdf|\.srdf)?(\.xacro)?$", "", name)
         target = stem + ("" if name.endswith(".xacro") else "_expanded") + (".srdf" if ".srdf" in name else ".urdf")
         raise RobotError(file, f"is a xacro program, which replay does not run; expand it: xacro {file} > {target}")
-    tags = (root,) if isinstance(root, str) else root
-    if found.tag not in tags:
-        wanted = " or ".join(f"<{tag}>" for tag in tags)
-        raise RobotError(file, f"begins with <{found.tag[:100]}>, not with {wanted}", line=found.line)
+    if found.tag != root:
+        raise RobotError(file, f"begins with <{found.tag[:100]}>, not with <{root}>", line=found.line)
     return found
 
 

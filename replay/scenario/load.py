@@ -35,7 +35,7 @@ from replay.scenario.source import (
     resolve_name,
 )
 from replay.scenario.sweep import SweepCase, SweepPart, cases, replaced
-from replay.scenario.yaml_text import parse
+from replay.scenario.yaml_file import read_yaml
 
 if TYPE_CHECKING:
     from replay.scenario.recorded import RecordedMotion
@@ -102,15 +102,7 @@ def load_model(file_or_name: str | Path) -> Model:
     names = ", ".join(sorted(BUILTIN_MODELS))
     if not str(file_or_name):
         raise InvalidValue("model", "''", f"names none; give a file, or a built-in model: {names}")
-    library = Folder(Path(file_or_name))
-    shown = library.shown(library.main)
-    problems: list[Problem] = []
-    try:
-        root = parse(library.read(library.main), shown, problems)
-    except SourceRule as error:
-        raise ScenarioError([Problem(f"{error}; built-in models are: {names}", file=shown)]) from None
-    if root is None or problems:
-        raise ScenarioError(problems)
+    root = read_yaml(Path(file_or_name), besides=f"; built-in models are: {names}")
     if not isinstance(root.value, dict) or "links" in root.mapping:
         what = "a scenario" if root.mapping else root.shown()
         raise ScenarioError(

@@ -92,7 +92,7 @@ def test_a_scenario_called_like_a_word_of_the_message_stays_with_the_others(name
 def test_three_hundred_failures_of_four_causes():
     def message(k):
         return (
-            f"/tmp/night {k}/in/s_{k}.stl: {k + 1} triangle{'s' if k else ''} {'are' if k else 'is'} degenerate",
+            f"/nights/night {k}/in/s_{k}.stl: {k + 1} triangle{'s' if k else ''} {'are' if k else 'is'} degenerate",
             f"IndexError: index {k} is out of bounds for axis 0 (replay/collision/pairs.py:120)",
             "the process was ended by SIGSEGV",
             f"stopped: still running after the time limit of {k}.5 s",
@@ -100,7 +100,7 @@ def test_three_hundred_failures_of_four_causes():
 
     found = groups(failed({f"s{k}": message(k) for k in range(300)}))
     assert sorted(len(group.members) for group in found) == [75] * 4
-    assert {group.name.split()[1] for group in found} == {"/tmp/night", "IndexError:", "the", "stopped:"}
+    assert {group.name.split()[1] for group in found} == {"/nights/night", "IndexError:", "the", "stopped:"}
 
 
 def test_messages_that_say_nothing():

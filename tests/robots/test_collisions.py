@@ -10,6 +10,7 @@ import pytest
 import replay
 from replay.errors import ReplayError
 from replay.robots import checking
+from replay.scenario.load import load_sources
 from replay.scenario.scene import build
 from replay.simulation import touching
 from tests.robots import made
@@ -158,22 +159,25 @@ def test_capsules_meet_where_their_axes_are_within_their_radii(tmp_path):
     decided_as(np.array(gaps), met, 2e-3)
 
 
-def test_ellipsoids_meet_where_a_stretched_space_says_so(tmp_path):
+def test_ellipsoids_meet_where_a_stretched_space_says_so():
     """Two alike and parallel ones are balls where space is shrunk by their radii; beside a wall their height counts."""
-    slides = "".join(
-        f'<joint name="s{a}" type="slide" axis="{a}" range="-0.5 0.5"/>' for a in ("1 0 0", "0 1 0", "0 0 1")
-    )
-    turns = "".join(f'<joint name="t{a}" axis="{a}" range="-2 2"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
-    egg = '<geom type="ellipsoid" size="0.1 0.2 0.35"/>'
-    up = '<joint name="up" type="slide" axis="0 0 1" range="0 0.6"/>'
-    for inside in ("", turns):
-        still = f'<body name="a">{egg}</body>' if not inside else '<geom type="box" size="9 9 1" pos="0 0 -1"/>'
-        moved = f'<body name="b">{up if inside else slides}{inside}{egg}</body>'
-        (tmp_path / "r.xml").write_text(f"<mujoco><worldbody>{still}{moved}</worldbody></mujoco>")
-        _, poses, met = states(scene_of(tmp_path / "r.xml", tmp_path), 400)
-        radii = np.array([0.1, 0.2, 0.35])
-        T = np.array([pose["b"] for pose in poses])
-        if inside:
+    egg = "{type: ellipsoid, radii: [0.1, 0.2, 0.35], chord_error: 0.3 mm}"
+    axes = ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]")
+    slides = [f"type: prismatic, axis: {axis}, lower: -0.5, upper: 0.5" for axis in axes]
+    turns = [f"type: revolute, axis: {axis}, lower: -2, upper: 2" for axis in axes]
+    up = "type: prismatic, axis: [0, 0, 1], lower: 0, upper: 0.6"
+    wall = "{type: cuboid, size: [18, 18, 2]}"
+    radii = np.array([0.1, 0.2, 0.35])
+    for still, at, joints in ((egg, 0, slides), (wall, -1, [up, *turns])):
+        links = [f"  a: {{pose: {{xyz: [0, 0, {at}]}}, shapes: {{s: {still}}}}}"]
+        for k, joint in enumerate(joints):
+            body = f", shapes: {{s: {egg}}}" if k == len(joints) - 1 else ""
+            above = f"parent: l{k - 1}, " if k else ""
+            links.append(f"  l{k}: {{{above}joint: {{{joint}}}{body}}}")
+        text = "\n".join(["version: 1", "name: eggs", "rate: 1", "duration: 0", "links:", *links])
+        _, poses, met = states(build(load_sources("eggs.yaml", {"eggs.yaml": text.encode()})), 400)
+        T = np.array([pose[f"l{len(joints) - 1}"] for pose in poses])
+        if still == wall:
             decided_as(T[:, 2, 3] - np.linalg.norm(T[:, 2, :3] * radii, axis=1), met, 1e-3)
         else:
             scaled = np.linalg.norm(T[:, :3, 3] / radii, axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from replay.alignment.clock import ClockEstimate, Undetermined
@@ -103,7 +104,8 @@ def of_signal(signal: MeasuredSignal, *, verbose: bool = False) -> Iterator[str]
             f"largest {shown(found.largest, unit)} at {wording.seconds(at)}"
         )
         low, middle, high = (shown(value, unit) for value in found.percentiles)
-        yield f"percentiles 5, 50, 95: {low}, {middle}, {high}; correlation {found.correlation:.4f}"
+        correlation = f"; correlation {found.correlation:.4f}" if math.isfinite(found.correlation) else ""
+        yield f"percentiles 5, 50, 95: {low}, {middle}, {high}{correlation}"
     if found.fit is not None and not signal.matched.pair.steps and signal.fit is None:
         yield f"best fit: {line(found.fit, unit)}"
     if signal.fit is not None:

@@ -21,8 +21,8 @@ from replay.scenario.measured import MeasuredMapPart
 from replay.scenario.measured_signals import EVENTS
 from replay.scenario.model import Scenario
 from replay.scenario.problems import translate
-from replay.scenario.source import Attached, Folder, Library, SourceRule, problem_at
-from replay.scenario.yaml_text import parse
+from replay.scenario.source import Attached, Folder, Library, problem_at
+from replay.scenario.yaml_file import read_yaml
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +65,7 @@ def load_map(path: Path) -> tuple[MeasuredMapPart, Callable[[KeyPath, str], Prob
     Raises:
         ScenarioError: it cannot be read, or is no valid map.
     """
-    library = Folder(path)
-    shown = library.shown(library.main)
-    problems: list[Problem] = []
-    try:
-        root = parse(library.read(library.main), shown, problems)
-    except SourceRule as error:
-        raise ScenarioError([Problem(str(error), file=shown)]) from None
-    if root is None or problems:
-        raise ScenarioError(problems)
+    root = read_yaml(path)
     if not isinstance(root.value, dict):
         raise ScenarioError([root.place.problem("a map of a measured log is a mapping with `signals`")])
     if set(root.mapping) == {"measured"}:

@@ -1,8 +1,9 @@
 """From Python to LLVM, with less of what numba does on the way; most of the time of compiling is spent there.
 
-Left out are passes that find nothing in kernels, which have no closures and no operators on whole arrays; the types of
-operators are looked for once, not at each use; and numba's option sets compare without rebuilding their defaults. Which
-code comes out is the same. `compiler` says for which numba this holds.
+Left out are passes that find nothing in kernels, which have no closures and no operators on whole arrays (a closure
+would not compile, an operator would make an array at each step); the types of operators are looked for once, not at
+each use; and numba's option sets compare without rebuilding their defaults. The code that comes out is the same. For
+which numba this holds: `compiler`.
 """
 
 from __future__ import annotations

@@ -20,15 +20,16 @@ from replay.geometry.tree import TREE_TYPE, Tree
 from replay.numerics.arrays import Floats, Integers
 from replay.numerics.jit import entry, kernel, leaf_kernel
 from replay.sensing.electrostatics.nodes import NODES_TYPE, Nodes, children
+from replay.sensing.electrostatics.placement import RESOLVED
 
 _IMAGE = 0.3
-_RESOLVED = 3e-3
+"""Weight w of the unit's own nodes."""
 
 
 @leaf_kernel
 def _score(nodes: Nodes, node: int, square: float, distance: float, weight: float) -> float:
     r = 0.5 * nodes.panels.diameter[node]
-    d = max(distance, 0.3 * r, _RESOLVED)
+    d = max(distance, 0.3 * r, RESOLVED)
     return float(weight * nodes.panels.area[node] * square * 4.0 * r * r / (d * d * d))
 
 

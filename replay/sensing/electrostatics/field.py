@@ -30,6 +30,7 @@ from replay.sensing.electrostatics.surveys import PIECE, growing, trees
 from replay.sensing.electrostatics.unit import Unit
 
 _NODES = 400
+"""N: nodes of bodies and unit together."""
 
 _COMMON = 1e-2
 """Share of a reading that both cuts may be off alike: rules of integration, grids (measured on the shared cases)."""
