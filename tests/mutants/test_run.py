@@ -183,6 +183,20 @@ def test_a_test_that_takes_too_long_is_left_and_no_fault(tmp_path):
     assert told(tmp_path, {"tests/test_a.py": test}, LEFT) == ["passed ['tests/test_a.py::test_short']"]
 
 
+SCHEDULED = """
+from tests.mutants import trial
+trial._AUTOGROUP = Path(sys.argv[1]) / "autogroup"
+print(tree.run(["tests/test_a.py"], 60.0, compiled=False).verdict, trial._AUTOGROUP.read_text().strip())
+"""
+
+
+@pytest.mark.parametrize(("before", "after"), [("", ""), ("/autogroup-7 nice -3\n", "-3")])
+def test_a_session_is_as_urgent_as_the_one_before_where_sessions_are_scheduled(tmp_path, before, after):
+    """In a container the file may be there and empty."""
+    files = {"autogroup": before, "tests/test_a.py": "def test(): pass\n"}
+    assert told(tmp_path, files, SCHEDULED) == [f"passed {after}"]
+
+
 REACH = """
 from tests.mutants.mutations import mutations_of
 from tests.mutants.reach import Reach

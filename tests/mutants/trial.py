@@ -200,11 +200,15 @@ def _be_pytest(
 
 
 def _begin_session() -> None:
-    """Begin a session, no more urgent than the one before: Linux schedules sessions, and a new one has priority 0."""
-    before = _AUTOGROUP.read_text().split()[-1] if _AUTOGROUP.exists() else "0"
+    """Begin a session, no more urgent than the one before: Linux may schedule sessions, and a new one has priority 0.
+
+    Where it schedules groups of control instead, as in containers, the file is there and says nothing.
+    """
+    said = _AUTOGROUP.read_text().split() if _AUTOGROUP.exists() else []
     os.setsid()
-    with contextlib.suppress(OSError):
-        _AUTOGROUP.write_text(before)
+    if said:
+        with contextlib.suppress(OSError):
+            _AUTOGROUP.write_text(said[-1])
 
 
 class _Watch:
