@@ -9,9 +9,6 @@ from replay.numerics.arrays import Flags, Floats, Integers
 _PARABOLA = 0.5 / 30.0**0.5
 """Root mean square of u (1 - u) / 2."""
 
-_JUMP = 1.0 / 6.0**0.5
-"""Root mean square of u where it is below v, and of 1 - u elsewhere, v being where the jump is."""
-
 
 class Places:
     """Where some times lie among the times of samples.
@@ -44,13 +41,11 @@ def line_errors(value: Floats) -> Floats:
     """Return (n - 1,) how far each line between (n,) samples may be off, root mean square.
 
     A parabola whose second differences are b leaves its chord by b u (1 - u) / 2, u in 0..1; b is the mean of those at
-    both ends. What a line rises by more than its neighbours together, no smooth curve does: it is a jump, at any u.
+    both ends. A jump between two samples is off by more, and is seen there at least.
     """
-    rises = np.pad(np.nan_to_num(np.abs(np.diff(value))), 1)
-    jumps = np.maximum(rises[1:-1] - rises[:-2] - rises[2:], 0.0)
     bends = np.abs(np.diff(value, 2, prepend=np.nan, append=np.nan))
     bends = np.where(np.isnan(bends), 0.0, bends)
-    return np.maximum(0.5 * (bends[:-1] + bends[1:]) * _PARABOLA, jumps * _JUMP)
+    return np.asarray(0.5 * (bends[:-1] + bends[1:]) * _PARABOLA)
 
 
 def slopes(time: Floats, value: Floats) -> tuple[Floats, Floats]:

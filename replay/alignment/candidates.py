@@ -95,7 +95,9 @@ def candidates(traces: Sequence[Trace], *, drifts: bool, lowest: float, highest:
         if loss > _LEAST_GAIN * starts[0][0]:
             break
         mine = taken[lowest <= offset <= highest]
-        if len(mine) == _MOST_CANDIDATES or any(abs(offset - other) < resolution for side in taken.values() for other in side):
+        if len(mine) == _MOST_CANDIDATES or any(
+            abs(offset - other) < resolution for side in taken.values() for other in side
+        ):
             continue
         mine.append(offset)
         fit = refine(traces, fit_at(traces, offset, drift, middle, drifts=False), reach=resolution, close=0.1)
