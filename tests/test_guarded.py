@@ -78,14 +78,13 @@ def scenario(guards: str = STOP, **written: str) -> replay.Scenario:
 
 
 def columns(made: replay.Scenario) -> dict[str, np.ndarray]:
-    """Return all columns that do not depend on how frames are divided into blocks, guards or not."""
+    """Return all columns."""
     blocks = list(replay.simulate(made))
     parts = {"positions": [block.joint_positions for block in blocks], "poses": [block.link_poses for block in blocks]}
     parts["velocities"] = [block.joint_velocities for block in blocks]
     for name in ("guards", "distance", "capacitive", "collision"):
         for field in getattr(blocks[0], name).present():
-            if field.name != "clearance_bound":  # a bound, as sharp as its block allows
-                parts[f"{name}.{field.name}"] = [getattr(getattr(block, name), field.name) for block in blocks]
+            parts[f"{name}.{field.name}"] = [getattr(getattr(block, name), field.name) for block in blocks]
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 

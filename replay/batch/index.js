@@ -40,7 +40,7 @@ function element(row) {
   text(summary, "code", name);
   if (message) summary.append(`: ${message}`);
   if (curve) text(summary, "span", ` ${curve}`, "curve").title = "smallest clearance of the last nights";
-  if (!fine) text(summary, "span", ` (${since ? `since ${since}` : "for the first time"})`, "note");
+  if (!fine) text(summary, "span", ` (${since ? `since ${since.slice(0, 16).replace("T", " ")}` : "for the first time"})`, "note");
   details.addEventListener("toggle", () => open(details, name, address, picture));
   return details;
 }

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import replay
 from replay.batch.accepted import last_accepted
-from replay.batch.groups import groups
+from replay.batch.groups import CauseGroup, groups
 from replay.batch.history import Night, Past, append_night, nights
-from replay.batch.judged import INDEX, JUNIT, METRICS, SUMMARY, Regression, verdicts
+from replay.batch.judged import INDEX, JUNIT, METRICS, SUMMARY, Judged, Regression, verdicts
 from replay.batch.metrics import MAIN, for_history, write_metrics
 from replay.batch.report_index import index
 from replay.batch.report_junit import junit
@@ -22,6 +22,8 @@ from replay.errors import count
 from replay.logs.part_file import write_file
 
 HISTORY = "history.jsonl"
+_LINES = 30
+"""Scenarios, or groups of them, that are told one by one on the terminal."""
 
 
 def write_reports(found: Regression, *, history: Path | None = None) -> None:
@@ -92,10 +94,29 @@ def _kept(problems: list[Exception]) -> Iterator[None]:
         problems.append(error)
 
 
+def _line(item: Judged) -> str:
+    return f"{item.name}: {item.verdict.value}: {item.message}"
+
+
+def _called(group: CauseGroup) -> str:
+    """Return what begins the line of a group; one scenario alone is its own line."""
+    alone = len(group.members) == 1
+    return "" if alone else f"{count(len(group.members), 'scenario')}: {group.name}; at worst "
+
+
 def describe(found: Regression) -> list[str]:
-    """Return the outcome as lines for people: what needs attention, then counts."""
-    failing = [item for item in found.judged if not item.verdict.fine]
-    lines = [f"{item.name}: {item.verdict.value}: {item.message}" for item in failing]
+    """Return the outcome as lines for people: what needs attention, the worst first, then counts.
+
+    Of many scenarios each group is a line, with its worst one.
+    """
+    failing = sorted((item for item in found.judged if not item.verdict.fine), key=lambda item: item.order)
+    if len(failing) <= _LINES:
+        lines = [_line(item) for item in failing]
+    else:
+        grouped = groups(failing)
+        lines = [f"{_called(group)}{_line(group.members[0])}" for group in grouped[:_LINES]]
+        left = len(grouped) - _LINES
+        lines += [f"and {count(left, 'more group')}"] if left > 0 else []
     if found.unused:
         number = count(len(found.unused), "unused baseline")
         lines.append(f"{number}, of no scenario given: {', '.join(found.unused)}; delete the folder of what is gone")

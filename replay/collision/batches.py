@@ -124,7 +124,7 @@ class FrameDecider:
                 course.begin,
                 ways,
                 course.ways,
-                course.rounding,
+                course.largest_rounding,
                 limit,
                 sieved,
                 scratch,

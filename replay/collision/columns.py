@@ -120,7 +120,9 @@ class CollisionColumns(Columns):
     evaluated: Annotated[Flags, Field(each="pairs", open=(1,), begins=("evaluation of the clearance",))]
     undecided: Annotated[Flags, Field(each="pairs", events={"undecided": 3})]
     between: Annotated[Bytes | None, _BETWEEN] = None
-    clearance_bound: Annotated[Floats | None, Field(unit="m", each="pairs", gate="between", since=2)] = None
+    clearance_bound: Annotated[
+        Floats | None, Field(unit="m", each="pairs", gate="between", since=2, spoken="proven clearance")
+    ] = None
     crossings: Crossings = field(default_factory=Crossings.none)
 
 

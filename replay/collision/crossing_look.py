@@ -88,7 +88,7 @@ def search_scratch(links: int, corners: Sets, counts: Integers) -> Search:
         precise_points(),
         np.empty((STACK, 2), np.int64),
         np.empty(STACK),
-        np.empty((7, 2), np.int64),
+        np.empty(2, np.int64),
         np.empty((3, 3)),
         np.empty(3),
         np.empty(DEPTH, np.int64),

@@ -240,7 +240,7 @@ def _answer(
         measure_travel(line, n, t0 / 1e9, t1 / 1e9, s)
         rounding = measure_arms(line, chains, volumes, way, a, b, n, s)
         limit = cap + least_way(n, s)[0]
-        r.seed[0, 0], r.seed[0, 1] = -1, -1
+        r.seed[:] = -1
         first, last, apart = -1, -1, -1  # the bodies meet first, meet last, and are apart again, where that was found
         for what in range(2):
             level = 2 - what

@@ -57,9 +57,9 @@ EXACT = 12  # 1 if double-doubles were needed
 
 
 class Workspace(NamedTuple):
-    """Scratch of a query, kept by the caller; `simplex` starts the next query where the last one ended."""
+    """Scratch of a query, kept by the caller."""
 
-    simplex: Integers  # (5, 2): vertex rows of A and B of up to 4 points; [4, 0] = their number, 0 = start afresh
+    simplex: Integers  # (5, 2): vertex rows of A and B of up to 4 points; [4, 0] = their number
     points: Floats  # (4, 3)
     weights: Floats  # (4,)
     result: Floats  # (16,), see DISTANCE..EXACT

@@ -3,8 +3,9 @@
 A and B meet iff the Minkowski difference A - B holds the origin; their distance is its distance to the origin. The loop
 keeps a simplex of 1..4 points of A - B, its point v nearest to the origin (an upper bound |v| on the distance) as a
 direction d of any length, and asks for the point w of A - B that is lowest along d. Nothing in A - B is lower, so
-d.w/|d| is a lower bound on the distance along -d, and w is the simplex's next point. Without a simplex to start from,
-d is the mean of B's vertices subtracted from that of A's. Divisions and roots wait until a bound is worth having.
+d.w/|d| is a lower bound on the distance along -d, and w is the simplex's next point. At first, without a simplex, d is
+the mean of B's vertices subtracted from that of A's: every query starts afresh, so that its answer depends on nothing
+else, to the last bit. Divisions and roots wait until a bound is worth having.
 
 Nothing is answered without a proof:
 - SEPARATED: a lower bound minus its rounding error is above `cutoff` (0 asks for the boolean, inf for the distance),
@@ -89,12 +90,8 @@ def query(
             without `refine`, which is as large as all the rest and seldom needed.
     """
     simplex, points, weights, result = work.simplex, work.points, work.weights, work.result
-    # the simplex of an earlier answer, in this pose
-    n = simplex[4, 0]
-    for k in range(n):
-        x, y, z = mapped(b, simplex[k, 1], rotation, translation)
-        i = simplex[k, 0]
-        points[k, 0], points[k, 1], points[k, 2] = a.vertices[i, 0] - x, a.vertices[i, 1] - y, a.vertices[i, 2] - z
+    n = 0
+    simplex[4, 0] = 0
     result[DISTANCE], result[LOWER], result[STEPS], result[EXACT] = np.inf, 0.0, 0.0, 0.0
     result[DIRECTION], result[DIRECTION + 1], result[DIRECTION + 2] = 0.0, 0.0, 0.0
     begin_a, end_a, table_a, side_a = a.first[set_a], a.first[set_a + 1], a.table[set_a], a.side[set_a]

@@ -182,7 +182,7 @@ def _to_world(
 
 @kernel
 def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status: Bytes, distance: Floats) -> None:
-    """Write status and distance of set 0 of a and set 0 of b at each of T_a_b (n, 4, 4); each query starts afresh.
+    """Write status and distance of set 0 of a and set 0 of b at each of T_a_b (n, 4, 4).
 
     Args:
         a, b: the bodies.
@@ -201,6 +201,5 @@ def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status
             square += translation[i] * translation[i]
             for j in range(3):
                 rotation[i, j] = T_a_b[k, i, j]
-        work.simplex[4, 0] = 0
         status[k] = query(a, 0, b, 0, rotation, translation, reach + math.sqrt(square), cutoff, 0.0, work, precise)
         distance[k] = work.result[DISTANCE] if status[k] == SEPARATED else 0.0

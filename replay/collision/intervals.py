@@ -11,12 +11,12 @@ from replay.collision import crossing_look, crossing_search, interval_proof
 from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
-from replay.collision.crossing_look import PROVEN_ROUNDING, PROVEN_SHARE, Questions
+from replay.collision.crossing_look import Questions
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_steps import Chains
 from replay.collision.ways import fill_ways, first_ways
-from replay.kinematics.linkage import POSE_ROUNDING, Linkage, LinkPoses
+from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
@@ -34,12 +34,13 @@ class Course:
         time: (m + 1,) [ns] of the frames at both ends of m intervals.
         first: frame of the scenario that the first interval ends at.
         begin: frame of the block that the first interval ends at: 0, or 1 where there is no frame before the block.
-        ways, rounding: see `ways.fill_ways`.
+        centers, ways, rounding: see `ways.fill_ways`.
     """
 
     time: Integers
     first: int
     begin: int
+    centers: Floats
     ways: Floats
     rounding: Floats
 
@@ -49,6 +50,12 @@ class Course:
         middle = (self.ways.shape[1] + 1) // 2
         parts = [self.ways[:, :middle].sum(axis=1), self.ways[:, middle:].sum(axis=1)]
         return np.maximum(*parts) * (1.0 + 2.0**-40), self.ways.max(axis=1, initial=0.0)
+
+    @cached_property
+    def largest_rounding(self) -> Floats:
+        """(V,) the largest of each row of `rounding` [m]."""
+        largest: Floats = self.rounding.max(axis=1, initial=0.0)
+        return largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,15 +122,17 @@ class Intervals:
         return self._course(np.ascontiguousarray(poses.local), travel, time, first + 1 - lead, 1 - lead)
 
     def _course(self, local: Floats, travel: Floats, time: Integers, first: int, begin: int) -> Course:
-        ways, rounding = np.empty((self._first[-1], len(local) - 1)), np.empty(self._first[-1])
-        points = np.empty((len(local), 3))
-        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, points, ways, rounding)
-        return Course(time, first, begin, ways, rounding)
+        ways, rounding = np.empty((2, self._first[-1], len(local) - 1))
+        centers = np.empty((self._first[-1], len(local), 4))
+        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, centers, ways, rounding)
+        return Course(time, first, begin, centers, ways, rounding)
 
-    def still(self, poses: LinkPoses) -> Course:
-        """Return a course of one interval on which nothing moves from the first of some poses."""
-        travel = np.zeros((len(self._linkage.links), 1, 2))
-        return self._course(np.repeat(poses.local[:1], 2, axis=0), travel, np.zeros(2, dtype=np.int64), 0, 0)
+    def still(self) -> Course:
+        """Return a course of one interval on which nothing moves, whatever the poses: pairs that cannot move ask it."""
+        joints, free, links = (len(part) for part in (self._linkage.joints, self._linkage.free_joints, self._paths))
+        poses = self._linkage.forward(np.zeros((2, joints)), np.tile(np.identity(4), (2, free, 1, 1)))
+        travel = np.zeros((links, 1, 2))
+        return self._course(np.ascontiguousarray(poses.local), travel, np.zeros(2, dtype=np.int64), 0, 0)
 
     def clear(self, shape: tuple[int, int], course: Course) -> tuple[Bytes, Floats]:
         """Return the columns of pairs that are clear and farther apart than the largest bound that is told."""
@@ -134,7 +143,7 @@ class Intervals:
     def half_steps(self, course: Course) -> Floats:
         """Return half of how far each body moves between two frames at most, seen from the world (B,) [m]."""
         world = self._first[:-1]
-        half: Floats = 0.5 * course.ways[world].max(axis=1, initial=0.0) + course.rounding[world]
+        half: Floats = 0.5 * course.ways[world].max(axis=1, initial=0.0) + course.largest_rounding[world]
         return half
 
     def rows(self, pairs: Integers) -> Integers:
@@ -163,12 +172,14 @@ class Intervals:
         interval_proof.sort_out(
             self._bodies,
             self._volumes,
+            course.centers,
             pairs,
             middle,
             rows,
             half,
             longest,
-            course.rounding,
+            course.largest_rounding,
+            course.centers[:, :, 3].max(axis=1),
             self._limit,
             self._cap,
             kinds,
@@ -176,14 +187,20 @@ class Intervals:
         )
         return kinds
 
-    def quiet(self, rows: Integers, course: Course) -> Floats:
+    def quiet(self, pairs: Integers, rows: Integers, course: Course) -> Floats:
         """Return the bounds (m, c) of QUIET pairs over the m intervals of a block, as `certify` has them."""
-        way = course.ways[rows[:, 0]] + course.ways[rows[:, 1]]
-        error = 2.0 * (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]])
-        size = (course.rounding[rows[:, 0]] + course.rounding[rows[:, 1]]) / POSE_ROUNDING
-        near = np.maximum(self._limit * PROVEN_SHARE - PROVEN_ROUNDING * size, 0.0)
-        least = 0.5 * (near[:, None] + near[:, None] - np.where(way > 0.0, way + error[:, None], way))
-        bound: Floats = np.minimum(np.maximum(least, 0.0), self._cap).T
+        bound = np.empty((course.ways.shape[1], len(pairs)))
+        interval_proof.fill_quiet(
+            self._volumes,
+            course.centers,
+            pairs,
+            rows,
+            course.ways,
+            course.rounding,
+            self._limit,
+            self._cap,
+            bound,
+        )
         return bound
 
     def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:
@@ -199,6 +216,7 @@ class Intervals:
             head,
             course.begin,
             rows,
+            course.centers,
             course.ways,
             course.rounding,
             self._limit,

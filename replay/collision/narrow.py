@@ -109,7 +109,7 @@ def _scratch(counts: Integers) -> _Scratch:
         workspace(),
         np.empty((STACK, 2), np.int64),
         np.empty(STACK),
-        np.empty((7, 2), np.int64),
+        np.empty(2, np.int64),
         np.empty((3, 3)),
         np.empty(3),
         np.zeros_like(counts),
@@ -123,7 +123,7 @@ def _decide_pair(
     """Decide a pair in all frames of its task; return False, with nothing of use written, where it is left."""
     a, b = frames.pairs[p, 0], frames.pairs[p, 1]
     s.counts[:] = 0
-    s.seed[0, 0], s.seed[0, 1] = -1, -1  # nothing is carried from one pair or block to the next
+    s.seed[:] = -1
     for f in range(frames.task.shape[0]):
         if is_asked_for(frames, f, p, s.rotation, s.translation):
             status, distance = closest(

@@ -146,7 +146,6 @@ def sets_apart(
     total = -way - 2.0 * pad
     rounding = 2.0 * ROUNDING * size
     for end in range(2):
-        work.simplex[4, 0] = 0
         rotation, translation, cutoff = e.rotation[end], e.translation[end], way + 2.0 * pad
         status = query(sets, set_a, sets, set_b, rotation, translation, size, cutoff, rounding, work, precise)
         counts[QUERIES] += 1

@@ -50,7 +50,7 @@ class CollisionPipeline:
         margin: [m], for "near".
         savings: False decides every listed pair in every frame anew: no bodies, blocks or frames are ruled out by
             bounding volumes, nothing is taken from another frame, all convex sets of two bodies are compared, and
-            clearances are computed however far. The columns are the same, clearances within their accuracy.
+            clearances are computed however far. The columns are the same, to the last bit.
         motion: of the linkage; contacts between frames are proven absent or found by it, see `intervals`. Without it
             the frames are all that is looked at.
 
@@ -236,7 +236,7 @@ class CollisionPipeline:
             return
         if self._static is None:
             one = poses.slice(0, 1)
-            still = None if self._intervals is None else self._intervals.still(one)
+            still = None if self._intervals is None else self._intervals.still()
             self._static = []
             if self._pairs.static_count:
                 fixed = self._candidates(one, still).fixed()
@@ -265,15 +265,14 @@ class CollisionPipeline:
             frames = self._frames.decide(self.narrow_phase, batch, rows, poses)
             yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, None)
             return
-        middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
-        kinds = self._intervals.sorted_out(rows, middle, ways, course)
-        near = kinds == interval_proof.NEAR
         if self._savings:
-            quiet = kinds == interval_proof.QUIET
+            middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
+            kinds = self._intervals.sorted_out(rows, middle, ways, course)
+            near, quiet = kinds == interval_proof.NEAR, kinds == interval_proof.QUIET
             if self._own is not None:  # what the other engine says of them at the frames is not known
                 near, quiet = near | quiet, np.zeros_like(quiet)
             self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
-            yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(ways[quiet], course))
+            yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(rows[quiet], ways[quiet], course))
             columns, rows, ways = columns[near], rows[near], ways[near]
         shown, first = poses.slice(lead, n), poses.slice(0, 1)
         frames = self._frames.decide(self.narrow_phase, batch, rows, shown, ways, course)
@@ -284,8 +283,6 @@ class CollisionPipeline:
             if head is not None:
                 before = head._replace(clearance=self._frames.decide(self._own, batch, rows, first).clearance)
         known = self._intervals.answer(told, before, ways, course)
-        if not self._savings:  # as it is told where these are not looked at
-            known.bound[(known.between == Between.CLEAR) & (kinds == interval_proof.FAR)] = self._cap
         yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
 
     def _clear(self, columns: Integers, rows: Integers, bound: Floats) -> _Found:

@@ -46,7 +46,6 @@ def closest_of_all(
     best, found, undecided = limit, False, False
     for set_a in range(bodies.set_first[a], bodies.set_first[a + 1]):
         for set_b in range(bodies.set_first[b], bodies.set_first[b + 1]):
-            work.simplex[4, 0] = 0
             status = query(
                 bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work, precise
             )
@@ -67,7 +66,7 @@ def closest_of_all(
 @entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, int64[::1])
 @kernel
 def decide_without_savings(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -> None:
-    """Do as `narrow.decide`, by every convex set of one body against all of the other, from no earlier answer."""
+    """Do as `narrow.decide`, by every convex set of one body against all of the other."""
     work, precise = workspace(), precise_points()
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(frames.pairs)):

@@ -76,7 +76,8 @@ def closest(
         a, b: the two.
         rotation, translation: (3, 3) and (3,) of T_a_b.
         limit: larger distances are of no interest [m]; 0 asks for contact only.
-        seed: (7, 2): [0] the sets (global) that were nearest last time, -1 for none; [1:6] their simplex; in and out.
+        seed: (2,) the sets (global) that were nearest last time, -1 for none, which are looked at first; in and out.
+            They save work and change no result.
         work, precise: scratch of GJK; LEFT is returned where a query needs `precise` and it is None.
         nodes, gaps: (STACK, 2), (STACK,) scratch.
         counts: (COUNTS, ...) added to.
@@ -86,7 +87,7 @@ def closest(
     slack = 2.0 * ROUNDING * size
     best, found, undecided = limit, False, False
     nearest = np.inf
-    tried_a, tried_b = seed[0, 0], seed[0, 1]
+    tried_a, tried_b = seed[0], seed[1]
     set_a, set_b = tried_a, tried_b
     # the node pair on top of the stack, or, first, the seed
     waiting = 0
@@ -97,10 +98,7 @@ def closest(
         counts[BOXES] += 1
     first = tried_a >= 0
     while first or waiting > 0:
-        if first:
-            for k in range(5):
-                work.simplex[k, 0], work.simplex[k, 1] = seed[1 + k, 0], seed[1 + k, 1]
-        else:
+        if not first:
             waiting -= 1
             if gaps[waiting] > best:
                 continue
@@ -129,7 +127,6 @@ def closest(
             set_b = bodies.set_first[b] + bodies.tree.order[bodies.set_first[b] + bodies.tree.begin[row_j]]
             if set_a == tried_a and set_b == tried_b:
                 continue
-            work.simplex[4, 0] = 0
         status = query(bodies.sets, set_a, bodies.sets, set_b, rotation, translation, size, best, slack, work, precise)
         if status == LEFT:
             return LEFT, 0.0
@@ -145,9 +142,7 @@ def closest(
         # the nearest sets seed the next frame
         if distance < nearest or status != SEPARATED:
             nearest = distance
-            seed[0, 0], seed[0, 1] = set_a, set_b
-            for k in range(5):
-                seed[1 + k, 0], seed[1 + k, 1] = work.simplex[k, 0], work.simplex[k, 1]
+            seed[0], seed[1] = set_a, set_b
         if status == CONTACT:
             return CONTACT, 0.0
         if status == UNDECIDED:

@@ -5,10 +5,7 @@ boxes at the roots of their trees r. In a later frame, after the bodies have mov
 the volumes are at least g - w apart. Of the root boxes no corner has moved farther than k w, k the ratio of the radii
 of spheres that hold the boxes and the bodies, so along the three axes on which their gap is measured they have come
 nearer by k w each: r - sqrt(3) k w is left. While the first is above 0 and the second above the distance of interest,
-the pair is clear and the narrow phase would end at the roots, having found and kept nothing.
-
-Once it has gone on to convex sets it starts the next frame where it ended: from then on to the end of the block every
-frame is looked at, so that what it finds does not depend on what is left out.
+the pair is clear and the narrow phase would end at the roots, having found nothing.
 """
 
 from __future__ import annotations
@@ -76,7 +73,7 @@ def sieve_by_way(
         way_a, way_b = rows[p, 0], rows[p, 1]
         error = 2.0 * (rounding[way_a] + rounding[way_b])
         ratio = root_ratio(bodies, volumes, a, b)
-        left, quiet = 0.0, True
+        left = 0.0
         for f in range(level.shape[0]):
             if f > 0:
                 left -= ways[way_a, f - begin] + ways[way_b, f - begin]
@@ -96,24 +93,22 @@ def sieve_by_way(
             gap = sphere_gap(volumes, a, b, pose)
             if gap > limit:
                 counts[BY_SPHERE] += 1
-                if quiet and limit > 0.0:
-                    left = (
-                        min(gap, (root_gap(bodies, a, b, pose, size, rotation, translation) - limit) / ratio) - margin
-                    )
-                elif quiet:
-                    left = gap - margin
+                left = gap - margin
+                if limit > 0.0:
+                    root = root_gap(bodies, a, b, pose, size, rotation, translation)
+                    left = min(gap, (root - limit) / ratio) - margin
             elif volumes_meet(volumes, a, b, pose, frames.turns[0, f], scratch):
-                level[f, p], task[f, p], quiet = 1, RUN, False
+                level[f, p], task[f, p] = 1, RUN
             elif limit > 0.0:
                 root = root_gap(bodies, a, b, pose, size, rotation, translation)
-                if quiet and root > limit:
+                if root > limit:
                     counts[BY_VOLUME] += 1
                     left = (
                         min(boxes_gap(volumes, a, b, pose, frames.turns[0, f], scratch), (root - limit) / ratio)
                         - margin
                     )
                 else:
-                    task[f, p], quiet = RUN, False
+                    task[f, p] = RUN
             else:
                 counts[BY_VOLUME] += 1
                 left = boxes_gap(volumes, a, b, pose, frames.turns[0, f], scratch) - margin

@@ -164,7 +164,7 @@ _Three = tuple[float, float, float]
 @functools.lru_cache(maxsize=64)
 def _mesh_change(names: tuple[str, str], data: tuple[bytes, bytes], scales: tuple[_Three, _Three]) -> str:
     """Return "bow.stl (triangles 1200 -> 1300, volume 1.2 -> 1.3 l)": what differs of triangles, bounds and volume."""
-    shown = PurePosixPath(names[1]).name
+    shown = " -> ".join(dict.fromkeys(PurePosixPath(name).name for name in names))
     try:
         a, b = (_triangles(*one) for one in zip(names, data, scales, strict=True))
     except ReplayError as error:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from replay.collision.columns import CollisionColumns
 from replay.comparison import quantities
 from replay.comparison.difference import Difference, EventDifference, Fate, SignalDifference
 from replay.comparison.rules import EXACT
@@ -178,14 +179,32 @@ def _pair(items: Sequence[SignalDifference], limit: float | None) -> tuple[Sever
     clearance = by_field.get("clearance")
     if clearance is not None and (clearance.worst_abs is not None or clearance.nan):
         return Severity.CLEARANCE, clearance, _clearance(clearance, limit)
+    near = by_field.get("evaluated")
+    if near is not None and near.lone_events:
+        bound = by_field.get("clearance_bound", near)
+        return Severity.CLEARANCE, bound, _nearness(near, bound, limit)
     if level is not None:
         return Severity.READING, level, _event(level)
     first = _first_of(items, _ABOUT_A_PAIR)
     return Severity.BOOKKEEPING, first, _any(first)
 
 
+def _nearness(near: SignalDifference, bound: SignalDifference, limit: float | None) -> str:
+    """Return how a pair comes within the margin, or leaves it, in one run alone, and what is proven of its way."""
+    event = next(event for event in near.events if event.fate is not Fate.SHIFTED)
+    at = event.baseline or event.candidate
+    assert at is not None
+    comes = event.what.endswith(" begins") is (event.fate is Fate.APPEARED)
+    proven = "clearance" if bound.least is None else f"proven clearance {quantities.change(*bound.least, 'm')},"
+    return f"{proven} {'comes within' if comes else 'leaves'} the margin at {_time(at.time)}{_expected(limit)}"
+
+
+def _expected(limit: float | None) -> str:
+    return "" if limit is None else f" (limit {quantities.shown(limit, 'm')})"
+
+
 def _clearance(item: SignalDifference, limit: float | None) -> str:
-    expected = "" if limit is None else f" (limit {quantities.shown(limit, 'm')})"
+    expected = _expected(limit)
     worst, least = item.worst_abs, item.least
     if worst is None:
         return f"clearance known in one run only, in {count(item.nan, 'frame')}{expected}"
@@ -242,7 +261,8 @@ def _any(item: SignalDifference) -> str:
 def _label(item: SignalDifference) -> str:
     """Return what sentences call a field."""
     kind = KINDS.get(item.signal.topic.split("/")[1])
-    spoken = {field.name: field.spoken for field in kind.columns.fields()} if kind else {}
+    columns = kind.columns if kind else CollisionColumns if item.signal.topic == _COLLISION else None
+    spoken = {field.name: field.spoken for field in columns.fields()} if columns else {}
     return spoken.get(item.signal.field, item.signal.field.replace("_", " "))
 
 

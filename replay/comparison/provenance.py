@@ -20,20 +20,37 @@ _TEXTS = (".yaml", ".yml")
 def provenance_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
     """Return what the recordings say of themselves that differs: versions, code, model, libraries and scenario texts.
 
-    The names behind the columns are not part of it: they are compared as signals. Bodies are part of the scene.
+    The names behind the columns are not part of it: they are compared as signals. Bodies are part of the scene, but
+    for the names of their files.
     """
-    return _changes(_flat(baseline), _flat(candidate))
+    a, b = _bodies(baseline), _bodies(candidate)
+    moved = _moved(a, b)
+    return _changes(*({**_flat(p), **_of(bodies, moved)} for p, bodies in ((baseline, a), (candidate, b))))
 
 
 def file_changes(baseline: Provenance, candidate: Provenance) -> tuple[Change, ...]:
     """Return the bodies' files, such as meshes, that differ; scenario texts may differ and mean the same.
 
+    A file that only has another name, or stands elsewhere, is the same.
     A log of which a recording keeps an excerpt is the same if the excerpts are, or what they were cut out of. One that
     the recording is only compared with changes no reading.
     """
     a, b = _originals(baseline), _originals(candidate)
-    changes = _changes(_bodies(baseline), _bodies(candidate))
+    bodies = _bodies(baseline), _bodies(candidate)
+    moved = _moved(*bodies)
+    changes = _changes(*({name: d for name, d in files.items() if name not in moved} for files in bodies))
     return tuple(c for c in changes if c.name not in a or a[c.name] != b.get(c.name))
+
+
+def _moved(a: Mapping[str, str], b: Mapping[str, str]) -> frozenset[str]:
+    """Return the files that only one run has under their names, and the other one under another name."""
+    gone, new = ({name: d for name, d in one.items() if name not in other} for one, other in ((a, b), (b, a)))
+    both = {*gone.values()} & {*new.values()}
+    return frozenset(name for name, digest in (*gone.items(), *new.items()) if digest in both)
+
+
+def _of(files: Mapping[str, str], names: frozenset[str]) -> dict[str, str]:
+    return {name: digest for name, digest in files.items() if name in names}
 
 
 def _bodies(provenance: Provenance) -> dict[str, str]:

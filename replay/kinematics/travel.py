@@ -51,8 +51,10 @@ SHIFT, TURN = range(2)
 def joint_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
     """Write TRAVEL .. HIGHEST of a scalar joint over [t0, t1] [s]; `work` is (HALVINGS + 8, 8) scratch."""
     s0, s1 = script_time(line, joint, t0), script_time(line, joint, t1)
-    _script_travel(line, joint, s0, s1, work, found)
-    if line.clock_first[joint] < line.clock_first[joint + 1] and s1 > s0:
+    first = line.clock_first[joint]
+    slowed = first < line.clock_first[joint + 1] and line.clock_start[first] < t1  # later is another interval's affair
+    _script_travel(line, joint, s0, s1, slowed, work, found)
+    if slowed and s1 > s0:
         _add_warp(line, joint, t0, t1, s0, s1, found)
 
 
@@ -85,10 +87,9 @@ def _add_warp(line: Timeline, joint: int, t0: float, t1: float, s0: float, s1: f
 
 
 @leaf_kernel
-def _script_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
+def _script_travel(line: Timeline, joint: int, t0: float, t1: float, slowed: bool, work: Floats, found: Floats) -> None:
     """Write TRAVEL .. HIGHEST over [t0, t1] [s] of script time, the bounds as they follow the chord over it."""
     q0, q1 = scripted(line, joint, t0), scripted(line, joint, t1)
-    slowed = line.clock_first[joint] < line.clock_first[joint + 1]
     begin, end = line.piece_first[joint], line.piece_first[joint + 1]
     total, rounding, last = 0.0, 0.0, q0
     low, high = 0.0, 0.0

@@ -99,8 +99,9 @@ def cases(root: Node, name: str) -> tuple[SweepCase, ...]:
     if sweep is None:
         return ()
     combinations = list(_combinations(sweep))
-    if len(combinations) * _nodes(root) > limits.SWEEP_VALUES:
-        rule = f"makes {len(combinations)} cases of {_nodes(root)} values each; at most {limits.SWEEP_VALUES} values"
+    values_each = _nodes(root) - _nodes(sweep)  # no case has the sweep itself
+    if len(combinations) * values_each > limits.SWEEP_VALUES:
+        rule = f"makes {len(combinations)} cases of {values_each} values each; at most {limits.SWEEP_VALUES} values"
         raise ScenarioError([sweep.place.problem(f"sweep {rule} are read altogether")])
     labels = _labels(list(dict.fromkeys(path for values in combinations for path in values)))
     names: dict[str, None] = {}

@@ -8,6 +8,7 @@ from playwright.sync_api import sync_playwright
 
 from replay.batch.report_index import index
 from replay.batch.report_summary import summary
+from replay.batch.reports import describe
 from tests.batch import made_nights
 
 MOST = 2_000_000
@@ -30,6 +31,19 @@ def test_the_page_of_ten_thousand_is_small_and_so_is_the_summary(large):
     assert len(text) < 20_000
     assert text.startswith("# 10000 of 10000 scenarios need attention\n")
     assert "and 81 more groups" in text and "and 9980 more scenarios" in text
+
+
+def test_of_many_scenarios_the_terminal_tells_the_groups_and_of_few_each():
+    lines = describe(made_nights.regression(404))
+    assert len(lines) == 32
+    assert lines[0].startswith(
+        "4 scenarios: unexplained: inputs, model, libraries and code are the same; at worst carm"
+    )
+    assert lines[1].startswith("4 scenarios: person/part_7 radius 20 -> 28 cm; at worst carm_sweep[")
+    assert "contact" not in lines[1] and ": broken: " in lines[1]
+    assert lines[-2:] == ["and 71 more groups", "404 scenarios: 403 different, 1 broken"]
+    few = describe(made_nights.regression(30))
+    assert [": broken: " in line for line in few] == [True, *[False] * 30]
 
 
 def test_ten_thousand_rows_are_searched_and_shown_a_part_at_a_time(large):

@@ -1,14 +1,16 @@
-"""Twenty kinds of causes planted over many scenarios: grouped and named rightly, what nothing explains first."""
+"""Thirty kinds of causes planted over many scenarios: grouped and named rightly, what nothing explains first."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import replay
 from replay.batch.baseline import Baseline
 from replay.batch.case import CaseOrder, CaseStatus, run_case
 from replay.batch.groups import groups
 from replay.batch.judge import Judge
+from replay.batch.judged import RegressVerdict
 from replay.comparison.effects import Severity
 from replay.comparison.rules_file import read_rules
 from replay.recording.provenance import code_identity
@@ -31,17 +33,28 @@ links:
   forearm:
     joint: {type: revolute, axis: [0, 1, 0], lower: -100 deg, upper: 100 deg, velocity: 2, acceleration: 5}
     shapes: {tube: {type: cylinder, radius: 5 cm, height: 1, pose: {xyz: [0, 0, 0.5]}}}
+  lift: {pose: {xyz: [-3, 0, 0]}, joint: {type: prismatic}, shapes: {deck: {type: cuboid, size: [0.5, 0.5, 0.1]}}}
+  cart: {pose: {xyz: [-3, 0, 2]}, joint: {type: prismatic, deceleration: 2}, shapes: {box: {type: cube, size: 20 cm}}}
 motion:
   moves: [{to: {forearm: 60 deg}}]
+  points:
+    lift: [{time: 0, position: 0}, {time: 0.5, position: 10 cm}, {time: 1, position: 20 cm}]
+    cart: [{time: 0, position: 0}, {time: 1, position: -1}]
   free: {person: [{time: 0, xyz: [1.2, 0.6, 0.4]}]}
 sensors:
-  distance: {tip: {link: forearm, pose: {xyz: [0, 0, 1], rpy: [0, 90 deg, 0]}, aperture: 20 deg, range: 3}}
+  distance:
+    tip: {link: forearm, pose: {xyz: [0, 0, 1], rpy: [0, 90 deg, 0]}, aperture: 20 deg, range: 3}
+    down: {link: cart, pose: {xyz: [0, 0, -0.11], rpy: [180 deg, 0, 0]}, aperture: 15 deg, range: 3,
+      signal: {noise: {std: 1 mm, seed: 7}}}
   capacitive: {guard: {link: forearm, coupling: 10 pF,
     plates: {p: {size: [10 cm, 10 cm], pose: {xyz: [0.08, 0, 0.5], rpy: [0, 90 deg, 0]}}}}}
+guards: {gap: {when: {distance: down, below: 1.2 m}, stop: [cart]}}
 collision: {margin: 5}
 expect:
   - {pair: [forearm, person], clearance: {min: 2 cm}}
 """
+
+TIP = "    tip: {link: forearm, pose: {xyz: [0, 0, 1], rpy: [0, 90 deg, 0]}, aperture: 20 deg, range: 3}\n"
 
 
 def slab(thickness):
@@ -68,12 +81,35 @@ def file(name, content):
     return lambda files: {**files, name: content}
 
 
+def another_mesh(files):
+    """Return a scenario whose mesh is another file with other triangles."""
+    import trimesh
+
+    board = trimesh.creation.cylinder(0.3, 0.1, sections=8).export(file_type="stl")
+    kept = {name: content for name, content in files.items() if name != "top.stl"}
+    return {**change("file: top.stl", "file: board.stl")(kept), "board.stl": board}
+
+
+def moved_files(files):
+    """Return a scenario whose files have other names."""
+    main = change("file: top.stl", "file: meshes/bench.stl", "include: [person.yaml]", "include: [people/one.yaml]")
+    return {**main(files), "meshes/bench.stl": files["top.stl"], "people/one.yaml": files["person.yaml"]}
+
+
 def library(known):
     known["libraries"]["numpy"] = "1.0"
 
 
+def new_library(known):
+    del known["libraries"]["numpy"]
+
+
 def code(known):
     known["code"] = "0" * 64
+
+
+def version(known):
+    known["version"] = "0.0.9"
 
 
 CAUSES = {
@@ -98,11 +134,56 @@ CAUSES = {
     "expect[0].clearance.min 0.02 -> 3 m": change("min: 2 cm", "min: 3"),
     "rate 20 -> 40 Hz": change("rate: 20 Hz", "rate: 40 Hz"),
     "model.distance exact@3 -> rays@2": change("collision:", "model: {distance: {method: rays}}\ncollision:"),
+    "sensors.distance.tip.pose.xyz[2] 1 -> 1.05 m": change("{xyz: [0, 0, 1], rpy", "{xyz: [0, 0, 105 cm], rpy"),
+    "sensors.distance.tip.pose turned by 45 deg": change(
+        "xyz: [0, 0, 1], rpy: [0, 90 deg, 0]", "xyz: [0, 0, 1], quat_xyzw: [0, 0.3826834, 0, 0.9238795]"
+    ),
+    "sensors.distance.tip removed": change(TIP, ""),
+    "sensors.distance.down.signal.noise.seed 7 -> 8": change("seed: 7", "seed: 8"),
+    "guards.gap.when.below 1.2 -> 1 m": change("below: 1.2 m", "below: 100 cm"),
+    "links.cart.joint.deceleration 2 -> 4 m/s^2": change("deceleration: 2", "deceleration: 4"),
+    "motion.points.lift[1].position 10 -> 12 cm": change("position: 10 cm", "position: 120 mm"),
+    "motion.points.lift[1] added": change("{time: 0.5,", "{time: 0.25, position: 8 cm}, {time: 0.5,"),
+    "links.lift.joint.type prismatic -> fixed; motion.points.lift removed": change(
+        "joint: {type: prismatic}, ",
+        "",
+        "    lift: [{time: 0, position: 0}, {time: 0.5, position: 10 cm}, {time: 1, position: 20 cm}]\n",
+        "",
+    ),
+    "bench/top mesh top.stl -> board.stl (triangles 12 -> 32, volume 36 -> 25.5 l)": another_mesh,
+    "links.bench renamed desk": change("  bench: {", "  desk: {"),
+    "person/head added": file("person.yaml", PART.replace("1.8}", "1.8}, head: {type: sphere, radius: 12 cm}")),
+    "collision.disable[0] added": change("margin: 5", "margin: 5, disable: [{pair: [bench, person], reason: far}]"),
+    "expect[0] added": change("expect:\n", "expect:\n  - {pair: [bench, person], contact: always}\n"),
+    "forearm/tube radius 5 -> 6 cm; sensors.capacitive.guard.coupling 10 -> 12 pF": change(
+        "radius: 5 cm", "radius: 6 cm", "coupling: 10 pF", "coupling: 12 pF"
+    ),
     f"library numpy 1.0 -> {np.__version__}": library,
+    f"library numpy - -> {np.__version__}": new_library,
     f"unexplained: nothing but the code changed (code 00000000 -> {code_identity()[:8]})": code,
+    f"unexplained: nothing but the code changed (replay 0.0.9 -> {replay.__version__})": version,
 }
 """Names of groups, and what is done to a scenario's files, or to what the baseline's recording says of itself."""
-OF_FILES = list(CAUSES)[:-2]
+OF_FILES = list(CAUSES)[:-4]
+NONE = {
+    "units": change("aperture: 20 deg, range: 3}", "aperture: 0.3490658503988659, range: 300 cm}", "10 pF", "0.01 nF"),
+    "comments": change("links:\n", "# what there is\nlinks:  # by name\n"),
+    "files": moved_files,
+    "words": change("version: 1\n", "version: 1\ndescription: another\ntags: [new]\n"),
+}
+"""What is no change, however much of the text differs."""
+SEVERITIES = {
+    "expect[0].clearance.min 0.02 -> 3 m": Severity.BROKEN,
+    "expect[0] added": Severity.BROKEN,
+    "person/body radius 20 -> 21 cm": Severity.CLEARANCE,
+    "links.bench.pose.xyz[0] 1.5 -> 1.45 m": Severity.CLEARANCE,
+    "sensors.distance.tip.pose.xyz[2] 1 -> 1.05 m": Severity.READING,
+    "sensors.capacitive.guard.coupling 10 -> 12 pF": Severity.READING,
+    "sensors.distance.down.signal.noise.seed 7 -> 8": Severity.READING,
+    "motion.points.lift[1] added": Severity.CLEARANCE,
+    f"library numpy 1.0 -> {np.__version__}": Severity.READING,
+}
+"""How much some of the causes matter."""
 
 
 def recorded(name, files, folder):
@@ -124,13 +205,13 @@ def planted(folder, count):
     )
     judged, causes = [], {}
     for number in range(count):
-        for k, (cause, edit) in enumerate(CAUSES.items()):
+        for k, (cause, edit) in enumerate({**CAUSES, **NONE}.items()):
             name = f"s{number:02d}_{k:02d}"
             before = {"main.yaml": TEXT.replace("NAME", name), **files}
             _, result = recorded(name, before, folder / "base")
             assert result.status is CaseStatus.PASSED, result.error
             after = before
-            if cause in OF_FILES:
+            if cause in (*OF_FILES, *NONE):
                 after = edit(before)
             else:
                 path = folder / "base" / name / f"{name}.mcap"
@@ -143,14 +224,17 @@ def planted(folder, count):
 
 def check(folder, count):
     judged, causes = planted(folder, count)
+    assert {item.name for item in judged if item.verdict is RegressVerdict.SAME} == {
+        n for n in causes if causes[n] in NONE
+    }
     found = groups(judged)
     assert {group.name: len(group.members) for group in found} == dict.fromkeys(CAUSES, count)
     for group in found:
         assert {causes[item.name] for item in group.members} == {group.name}
-    assert [group.explained for group in found] == [False, *[True] * (len(CAUSES) - 1)]
-    order = [(group.severity, -group.members[0].size) for group in found[1:]]
+    assert [group.explained for group in found] == [False, False, *[True] * (len(CAUSES) - 2)]
+    order = [(group.severity, -group.members[0].size) for group in found[2:]]
     assert order == sorted(order)
-    assert found[1].severity is Severity.BROKEN
+    assert {name: next(group for group in found if group.name == name).severity for name in SEVERITIES} == SEVERITIES
     by_cause = {group.name: group.members[0] for group in found}
     return by_cause
 

@@ -45,9 +45,7 @@ def _boxes(bodies, halves, which, rotations, positions, work):
         i, j = which[k]
         size = 2.0 * (np.abs(positions[k]).max() + halves[i].max() + halves[j].max())
         gap = reference.box_gap(rotations[k], positions[k], halves[i], halves[j])
-        work.simplex[4, 0] = 0
         status = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, 0.0, 0.0, work, precise)
-        work.simplex[4, 0] = 0
         measured = gjk_kernel.query(bodies, i, bodies, j, rotations[k], positions[k], size, np.inf, 0.0, work, precise)
         hits += gap <= 0.0
         undecided += (status == gjk_exact.UNDECIDED) + (measured == gjk_exact.UNDECIDED)
@@ -81,7 +79,6 @@ def run_hulls(n, seed):
         size = 2.0 * (np.abs(bodies[i]).max() + np.abs(bodies[j]).max() + np.abs(position).max())
         moved = bodies[j] @ turn.T + position
         gap = reference.hull_gap(bodies[i], faces[i], edges[i], moved, faces[j], edges[j])
-        work.simplex[4, 0] = 0
         status = _query(several, i, j, turn, position, size, work)
         hits += gap <= 0.0
         undecided += status == gjk_exact.UNDECIDED
@@ -149,7 +146,6 @@ def test_tables_find_what_looking_at_every_vertex_finds():
 
 @numba.njit
 def _pair(a, b, rotation, translation, size, cutoff, work):
-    work.simplex[4, 0] = 0
     precise = gjk_exact.precise_points()
     return gjk_kernel.query(a, 0, b, 0, rotation, translation, size, cutoff, 0.0, work, precise)
 

@@ -73,6 +73,11 @@ def looked(recording):
     recording.collision.clearance[20:22, 0] = np.nan
 
 
+def within(recording):
+    recording.collision.evaluated[50:60, 1] = True
+    recording.collision.clearance[50:60, 1] = 0.01
+
+
 @pytest.mark.parametrize(
     ("change", "severity", "text"),
     [
@@ -85,6 +90,7 @@ def looked(recording):
         (undetected, Severity.READING, "status becomes nothing"),
         (triangle, Severity.BOOKKEEPING, "triangle becomes 2 33.3 ms earlier: right"),
         (moves, Severity.READING, "joint position +1.15 deg"),
+        (within, Severity.CLEARANCE, "clearance comes within the margin at 0.833333 s: arm/beam | stand/column"),
         (looked, Severity.BOOKKEEPING, "evaluation of the clearance 33.3 ms later: arm/beam | stand/base"),
     ],
 )

@@ -248,6 +248,17 @@ def test_a_library_version_is_named_and_leaves_the_verdict(tmp_path, capsys):
     check(tmp_path, capsys, PARKING, target, line, finding=("provenance", "libraries.numpy"), verdict="same")
 
 
+def test_a_body_whose_file_is_elsewhere_is_told_and_leaves_the_verdict(tmp_path):
+    before = next(name for name in read(PARKING).provenance.files if name.endswith(".stl"))
+
+    def move(known):
+        known["files"]["bodies/patient.stl"] = known["files"].pop(before)
+
+    found = replay.diff(PARKING, edited.write(PARKING, tmp_path / "b.mcap", provenance=move))
+    assert found.verdict is DiffVerdict.SAME and not found.scene
+    assert {change.name for change in found.provenance} == {f"/files/{before}", "/files/bodies/patient.stl"}
+
+
 def test_a_renamed_sensor_is_missing_and_extra_and_recognised(tmp_path, capsys):
     target = edited.write(PARKING, tmp_path / "b.mcap", rename=to_kopf, provenance=rename_sensor)
     code, _, html, junit = reports(tmp_path, PARKING, target)

@@ -2,10 +2,12 @@
 
 import json
 import pickle
+import re
 
 import pytest
 from pydantic import ValidationError
 
+from replay import limits
 from replay.errors import ScenarioError
 from replay.scenario.load import load, load_cases, load_sources
 from replay.scenario.sweep import SweepPart
@@ -124,6 +126,15 @@ def test_too_many_cases_are_refused(tmp_path):
     values = json.dumps(list(range(1, 102)))
     grid = f"  grid: {{rate: {values}, duration: {values}}}\n"
     assert "makes 10201 cases; at most 10000 are run" in problems(tmp_path, grid)[0]
+
+
+def test_values_are_counted_that_cases_have_and_not_those_of_the_sweep(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "SWEEP_VALUES", 1)
+    (told,) = problems(tmp_path, GRID)
+    each = int(re.search(r"4 cases of (\d+) values each", told)[1])
+    monkeypatch.setattr(limits, "SWEEP_VALUES", 40 * each)
+    assert len(load_cases(write(tmp_path, f"  grid: {{rate: {[f'{k} Hz' for k in range(1, 41)]}}}\n"))) == 40
+    assert len(problems(tmp_path, f"  grid: {{rate: {[f'{k} Hz' for k in range(1, 42)]}}}\n")) == 1
 
 
 def test_cases_share_their_meshes_in_memory(tmp_path):
