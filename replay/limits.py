@@ -105,6 +105,10 @@ CELLS: Final = 10_000_000
 """Cells of a table: of a CSV, JSON or Parquet log, or of an exported topic."""
 TEXT_LOG: Final = 256 * MIB
 """Bytes of a log in CSV, or of a measured curve."""
+LONG_LOG: Final = 512 * MIB
+"""Bytes of a log in CSV that measures readings and is a plain table of numbers."""
+LONG_CELLS: Final = 40_000_000
+"""Cells of such a log in the columns that are needed, with that of the times."""
 COLUMNS: Final = 10_000
 """Columns of a table."""
 

@@ -17,7 +17,7 @@ LARGEST_DRIFT = 2e-3
 _MOST_DRIFTS = 201
 _MOST_CANDIDATES = 10
 _MOST_PEAKS = 40
-"""Peaks of a landscape that are looked at, many of which are noise on the same hill."""
+"""Peaks of a landscape that are looked at, many of which are noise on the same hill; as many beyond the bounds."""
 
 _LEAST_GAIN = 0.1
 """Peaks below this part of the highest are left out."""
@@ -61,8 +61,14 @@ def pace(traces: Sequence[Trace]) -> float:
     return float(np.sqrt(np.mean([float(np.nanmean(trace.lines**2)) for trace in traces])))
 
 
-def candidates(traces: Sequence[Trace], *, drifts: bool) -> Candidates:
-    """Return the clocks among which the best one is, at all offsets at which simulation and log overlap."""
+def candidates(traces: Sequence[Trace], *, drifts: bool, lowest: float, highest: float) -> Candidates:
+    """Return the clocks among which the best one is, at all offsets at which simulation and log overlap.
+
+    Args:
+        traces: the signals.
+        drifts: whether clocks may drift.
+        lowest, highest: offsets [s] within which all that may be rivals are to be among them.
+    """
     first, last = min(float(t.log_time[0]) for t in traces), max(float(t.log_time[-1]) for t in traces)
     middle = 0.5 * (first + last)
     grid = SearchGrid(traces)
@@ -70,28 +76,34 @@ def candidates(traces: Sequence[Trace], *, drifts: bool) -> Candidates:
     steps = min(int(LARGEST_DRIFT * pace(traces) * (last - first)), _MOST_DRIFTS // 2) if drifts else 0
     tried = (LARGEST_DRIFT * np.arange(-steps, steps + 1) / max(steps, 1)).tolist()
     landscapes = [(drift, grid.landscape(drift, middle)) for drift in tried]
-    highest, either = (
+    upright, either = (
         max(float(gain.max()) for gain in gains)
         for gains in ([land.gain for _, land in landscapes], [land.gain_either for _, land in landscapes])
     )
-    turned = highest < 0.5 * either
+    turned = upright < 0.5 * either
     starts = []
     for drift, land in landscapes:
         height = land.gain_either if turned else land.gain
-        starts += [(-float(height[i]), float(land.offsets[i]), drift) for i in peaks(height)[:_MOST_PEAKS]]
+        tops = peaks(height)
+        inside = (land.offsets[tops] >= lowest) & (land.offsets[tops] <= highest)
+        for some in (tops[inside][:_MOST_PEAKS], tops[~inside][:_MOST_PEAKS]):
+            starts += [(-float(height[i]), float(land.offsets[i]), drift) for i in some]
     starts.sort()
     fits: list[ClockFit] = []
-    taken: list[float] = []
+    taken: dict[bool, list[float]] = {True: [], False: []}
     for loss, offset, drift in starts:
-        if len(taken) == _MOST_CANDIDATES or loss > _LEAST_GAIN * starts[0][0]:
+        if loss > _LEAST_GAIN * starts[0][0]:
             break
-        if any(abs(offset - other) < resolution for other in taken):
+        mine = taken[lowest <= offset <= highest]
+        if len(mine) == _MOST_CANDIDATES or any(
+            abs(offset - other) < resolution for side in taken.values() for other in side
+        ):
             continue
-        taken.append(offset)
+        mine.append(offset)
         fit = refine(traces, fit_at(traces, offset, drift, middle, drifts=False), reach=resolution, close=0.1)
         if drifts:
             fit = with_drift(traces, fit, reach=resolution, close=0.1)
-        if fit.signals and np.isfinite(fit.covariance).all():
+        if fit.signals:
             fits.append(fit)
     found = Candidates(tuple(fits), resolution, turned)
     return Candidates(tuple(sorted(fits, key=lambda fit: -found.gain(fit))), resolution, turned)

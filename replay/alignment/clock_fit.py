@@ -33,6 +33,9 @@ _MOST_STEPS = 30
 _SINGULAR = 1e10
 """Condition of the equations for the clock above which they do not determine it."""
 
+_LEAST_OWN = 1e-3
+"""A derivative of which less than this part is not a change of scale and bias tells nothing: rounding, an end."""
+
 _EXACT = 1e-12
 """Residuals below this part of a signal's size are rounding."""
 
@@ -49,6 +52,7 @@ class SignalFit:
         noise: standard deviation of both.
         scale: by which the simulated signal of size 1 is best multiplied.
         gain: logarithm of the likelihood over that of a constant; 0 where nothing can be said.
+        measured: (u,) of the samples used, off their mean.
         simulated: (u,) orthonormal to 1.
         smooth: (p, u) derivatives with regard to the clock, smooth ones, off 1 and `simulated`.
         exact: (p, u) those of the lines.
@@ -61,6 +65,7 @@ class SignalFit:
     noise: float
     scale: float
     gain: float
+    measured: Floats
     simulated: Floats
     smooth: Floats
     exact: Floats
@@ -69,6 +74,11 @@ class SignalFit:
     def log_time(self) -> Floats:
         """(u,) times of the samples used [s]."""
         return self.trace.log_time[self.used]
+
+    def gain_of(self, squares: float) -> float:
+        """Return the gain of whatever leaves so large a sum of squares."""
+        total = float((self.measured**2).sum())
+        return 0.5 * len(self.measured) * float(np.log(total / max(squares, total * _EXACT**2)))
 
     @property
     def columns(self) -> Floats:
@@ -127,8 +137,9 @@ def _products(a: Floats, b: Floats) -> Floats:
 
 def _inverse(normal: Floats) -> Floats:
     """Return the inverse of a matrix of one or two rows, infinite where it has none."""
-    size = np.sqrt(np.abs(np.diag(normal)))
-    if (size > 0.0).all():
+    diagonal = np.diag(normal)
+    if (diagonal > 0.0).all():
+        size = np.sqrt(diagonal)
         scaled = normal / np.outer(size, size)
         if np.linalg.cond(scaled) < _SINGULAR:
             return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
@@ -158,12 +169,14 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
     smooth, exact = ((slope * (along / norm))[None] for slope in (smooth, exact))
     if drifts:
         smooth, exact = (np.vstack([slope, slope * since[used]]) for slope in (smooth, exact))
+    length = np.sqrt((smooth**2).sum(axis=1))
     smooth -= smooth.mean(axis=1)[:, None]
     smooth -= (smooth * s).sum(axis=1)[:, None] * s
+    smooth[np.sqrt((smooth**2).sum(axis=1)) < _LEAST_OWN * length] = 0.0
     scale = along / norm
     off_lines = scale * trace.bends[places.index[used]]
     noise = float(np.sqrt(squares / (count - 2) + np.mean(off_lines**2)))
-    return SignalFit(trace, used, residual, off_lines, noise, scale, float(gain), s, smooth, exact)
+    return SignalFit(trace, used, residual, off_lines, noise, scale, float(gain), y, s, smooth, exact)
 
 
 def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
@@ -192,6 +205,11 @@ def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: flo
 def moved(traces: Sequence[Trace], fit: ClockFit, reference: float, *, drifts: bool) -> ClockFit:
     """Return the same clock, with its offset at another time of the log."""
     return fit_at(traces, fit.offset + fit.drift * (reference - fit.reference), fit.drift, reference, drifts=drifts)
+
+
+def is_told(fit: ClockFit) -> bool:
+    """Return whether samples tell the offset at all: of a jump that they pass by, none lies where it moves."""
+    return bool(np.isfinite(fit.covariance).all())
 
 
 def spreads(fit: ClockFit) -> tuple[Spread, ...]:

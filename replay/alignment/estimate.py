@@ -8,17 +8,17 @@ import numpy as np
 
 from replay.alignment.candidates import LARGEST_DRIFT, Candidates, candidates, pace, with_drift
 from replay.alignment.clock import ClockEstimate, Undetermined
-from replay.alignment.clock_fit import ClockFit, moved, refine, spreads
+from replay.alignment.clock_fit import ClockFit, is_told, moved, refine, spreads
 from replay.alignment.delays import signal_delays, signals_agree
 from replay.alignment.pair import SignalPair
-from replay.alignment.rivals import is_refuted, is_significant
+from replay.alignment.rivals import is_plain, is_refuted, is_significant
 from replay.alignment.trace import Trace, trace_of
 from replay.errors import InvalidValue
 
 _MOST_LOOKED_AT, _LEAST_LOOKED_AT = 1 << 16, 1 << 10
 """Samples of all signals, and of one at least, by which candidates are compared."""
 
-_LEAST_OVERLAP = 0.2
+_LEAST_OVERLAP = 0.4
 """Of the shorter of both, scenario and log, so much must overlap."""
 
 _RIVAL = 0.3
@@ -65,13 +65,15 @@ def estimate_clock(
     if not traces:
         return Undetermined(_nothing_moves(unused), unused=unused)
     few = [trace.thinned(max(_MOST_LOOKED_AT // len(traces), _LEAST_LOOKED_AT)) for trace in traces]
-    found = candidates(few, drifts=drift)
+    found = candidates(few, drifts=drift, lowest=lowest, highest=highest)
     best = _only_one(found, lowest, highest, pace(few))
     if isinstance(best, Undetermined):
         return Undetermined(best.reason, best.candidates, unused)
     fit = refine(traces, moved(traces, best, _centre(best), drifts=False), reach=found.resolution, close=_CLOSE)
     if drift:
         fit = with_drift(traces, fit, reach=found.resolution, close=_CLOSE)
+    if not is_told(fit):
+        return Undetermined(_between_samples(fit).reason, unused=unused)
     told = {signal.trace.name for signal in fit.signals}
     unused += tuple((t.name, "no sample lies where it moves") for t in traces if t.name not in told)
     drifts = _drift_interval(traces, fit, confidence) if drift else (0.0, 0.0, 0.0)
@@ -95,6 +97,8 @@ def _only_one(found: Candidates, lowest: float, highest: float, speed: float) ->
     if not within or (within[0] is not first and is_refuted(within[0], first)):
         return Undetermined(f"the best offset, {first.offset:.4g} s, is not within {lowest:g} .. {highest:g} s")
     best = within[0]
+    if all(map(is_plain, best.signals)):
+        return Undetermined("a straight line, a plain curve or one jump explains the log as well as any offset")
     if not is_significant(best, max(int((highest - lowest) * speed), 1)):
         return Undetermined("noise hides the signals: no offset explains the log better than chance does")
     rivals = [
@@ -112,7 +116,11 @@ def _only_one(found: Candidates, lowest: float, highest: float, speed: float) ->
     if overlap < _LEAST_OVERLAP:
         part = f"{100.0 * overlap:.0f} % of the shorter of scenario and log"
         return Undetermined(f"with the best offset, {best.offset:.4g} s, they overlap in {part} only")
-    return best
+    return best if is_told(best) else _between_samples(best)
+
+
+def _between_samples(fit: ClockFit) -> Undetermined:
+    return Undetermined(f"near the best offset, {fit.offset:.4g} s, no sample lies where the signals move")
 
 
 def _overlap(fit: ClockFit) -> float:

@@ -24,6 +24,9 @@ _LIKE_ONE = 0.1
 _ROUNDING = 1e-9
 """Residuals below this part of the signal's size need no explanation."""
 
+_FEWEST_VALUES, _SEVERAL, _FAR = 10, 2, 3.0
+"""Different values of a signal, samples of one, and its distance from others beside theirs, that tell a stand-in."""
+
 _LONGEST_DELAY = 2.0
 _MOST_LOOKED_AT = 1 << 12
 
@@ -45,6 +48,9 @@ def hints(matched: SampledFrames, statistics: ResidualStatistics) -> tuple[str, 
     """
     if statistics.count == 0 or matched.pair.steps:
         return ()
+    stand_in = stand_in_for_nothing(matched)
+    if stand_in is not None:
+        return (stand_in,)
     simulated, measured, rms = matched.simulated, matched.measured, statistics.rms
     if not (math.isfinite(rms) and rms > _ROUNDING * max(_size(simulated), _size(measured))):
         return ()
@@ -65,6 +71,28 @@ def hints(matched: SampledFrames, statistics: ResidualStatistics) -> tuple[str, 
         if delay is not None:
             found.append(f"a delay of {1e3 * delay:.4g} ms of this signal alone explains most of it")
     return tuple(found)
+
+
+def stand_in_for_nothing(matched: SampledFrames) -> str | None:
+    """Return that a number which loggers write where nothing is detected seems to be among the values, if one does.
+
+    That is the lowest or the highest value, exactly the same at several samples, far from all others beside how close
+    these are, and not what is simulated there.
+    """
+    measured = matched.pair.measured_value
+    known = np.unique(measured[np.isfinite(measured)])
+    if len(known) < _FEWEST_VALUES:
+        return None
+    steps = np.diff(known)
+    for number, gap, others in ((known[0], steps[0], steps[1:]), (known[-1], steps[-1], steps[:-1])):
+        times = int((measured == number).sum())
+        if times < _SEVERAL or not gap > _FAR * float(np.max(others)):
+            continue
+        simulated = matched.simulated[matched.measured == number]
+        if not (np.abs(simulated - number) < 0.5 * gap).any():
+            what = f"{times} measured values are exactly {number:.6g}, far from all others"
+            return f"{what}: if that stands for nothing detected, state it as `nothing`"
+    return None
 
 
 def own_delay(matched: SampledFrames) -> float | None:

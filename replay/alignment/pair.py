@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from replay.alignment.clock import LogClock
 from replay.errors import InvalidValue
 from replay.numerics.arguments import as_floats
 from replay.numerics.arrays import Floats
@@ -51,3 +52,10 @@ def fitted(pair: SignalPair, scale: float, offset: float) -> SignalPair:
     """Return the pair with what the simulation says turned into what the machine says: scale * value + offset."""
     value = scale * pair.value + offset
     return SignalPair(pair.name, pair.time, value, pair.measured_time, pair.measured_value, pair.steps)
+
+
+def on_same_turn(pair: SignalPair, clock: LogClock, turn: float) -> SignalPair:
+    """Return the pair with each measured angle on the turn on which it is nearest to the simulated one."""
+    simulated = np.interp(clock.simulated(pair.measured_time), pair.time, pair.value)
+    measured = pair.measured_value + turn * np.rint((simulated - pair.measured_value) / turn)
+    return SignalPair(pair.name, pair.time, pair.value, pair.measured_time, measured, pair.steps)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from replay.alignment.clock_fit import ClockFit
+from replay.alignment.clock_fit import ClockFit, SignalFit
 from replay.numerics.arrays import Floats
 
 _CERTAIN = 6.0
@@ -12,6 +12,15 @@ _CERTAIN = 6.0
 
 _CHANCE = 1e-4
 """Probability that what has nothing to do with the simulated signals is taken for them."""
+
+_WHITE = 0.8
+"""Errors are independent where they are worth this part of their number."""
+
+_ALIKE = 0.9
+"""Part of the variance above which coloured errors are a model's."""
+
+_FITTED = 3.0
+"""Scale, offset, and one more as the best of neighbours is taken."""
 
 
 def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
@@ -23,10 +32,11 @@ def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
         2 log odds = sum r^2 / n^2 - 1  -  sum over those of both  r_better^2 / n^2 - 1,
 
     of which the first sum has the variance 2 for each sample that is not in the second. Errors that last several
-    samples make all of it larger by their number.
+    samples make all of it larger by their number. What lines between frames may be off is as large as its square more
+    or less in the one and in the other.
     """
     best = {signal.trace.name: signal for signal in better.signals}
-    odds, alone = 0.0, 0
+    odds, hidden, alone = 0.0, 0.0, 0
     for signal in fit.signals:
         other = best.get(signal.trace.name)
         if other is None:
@@ -36,38 +46,83 @@ def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
         mine[signal.used] = signal.residual**2 / noise - 1.0
         theirs[other.used] = other.residual**2 / noise - 1.0
         odds += 0.5 * float(np.sum(mine[signal.used]) - np.sum(theirs[signal.used & other.used]))
+        hidden += 0.5 * float(np.sum(signal.off_lines**2)) / noise
         alone += int(np.sum(signal.used & ~other.used))
-    return bool(odds > (_CERTAIN + 3.0 * np.sqrt(0.5 * alone)) * better.samples / _independent(better))
+    independent = sum(map(_independent, better.signals))
+    certain = (_CERTAIN + 3.0 * np.sqrt(0.5 * alone)) * better.samples / independent
+    return bool(odds > certain + hidden)
 
 
 def is_significant(fit: ClockFit, places: int) -> bool:
     """Return whether a clock explains more than it would, at the best of so many places, of what wanders by itself.
 
-    The part R^2 of the variance that is explained, of which the gain is the logarithm, is held against chance as in a
-    regression: 1 - R^2 of n independent errors, p of them fitted, has a beta distribution of (n - p) / 2 and p / 2.
+    Of each signal the part R^2 of the variance that is explained, of which the gain is the logarithm, is held against
+    chance as in a regression: 1 - R^2 of n independent errors, p of them fitted, has a beta distribution of (n - p) / 2
+    and p / 2. Chances of several signals are taken together as by Fisher (1925). A signal that is like a plain curve
+    says nothing.
     """
-    from scipy.special import betainc
+    from scipy.special import betainc, gammaincc
 
-    fitted = len(fit.signals) + 2  # their scales, the offset, and one more as the best of neighbours is taken
-    free = _independent(fit) - fitted - 1.0
-    if not free > 0.0:
-        return False
-    left = float(np.exp(-2.0 * fit.gain / fit.samples))
-    return float(betainc(0.5 * free, 0.5 * fitted, left)) * places < _CHANCE
+    surprise = 0.0
+    for signal in fit.signals:
+        free = _independent_by_chance(signal) - _FITTED - 1.0
+        if free > 0.0 and not is_plain(signal):
+            left = float(np.exp(-2.0 * signal.gain / len(signal.residual)))
+            surprise -= float(np.log(max(betainc(0.5 * free, 0.5 * _FITTED, left), 1e-300)))
+    return float(gammaincc(len(fit.signals), surprise)) * places < _CHANCE
 
 
-def _independent(fit: ClockFit) -> float:
-    """Return how many independent errors a fit's samples are worth to its scales.
+def is_plain(signal: SignalFit) -> bool:
+    """Return whether a curve that anything is like for a while explains what was measured as well as the simulation.
+
+    A straight line is the same at any offset, and must be clearly worse; a cubic curve and one jump have as many
+    unknowns as scale, bias and offset, or one more, and must not be clearly better.
+    """
+    y, size = signal.measured, len(signal.residual)
+    total = float((y**2).sum())
+    time = signal.log_time - signal.log_time[0]
+    powers = np.polynomial.legendre.legvander(2.0 * time / time[-1] - 1.0, 3)
+    line, cubic = (_left(y, powers[:, : degree + 1]) for degree in (1, 3))
+    before = np.arange(1, size)
+    jump = total - float(np.max(np.cumsum(y)[:-1] ** 2 * size / (before * (size - before))))
+    certain = _CERTAIN * size / _independent(signal)
+    gains = (signal.gain_of(left) + sure for left, sure in ((line, certain), (cubic, -certain), (jump, -certain)))
+    return max(gains) > signal.gain
+
+
+def _left(y: Floats, columns: Floats) -> float:
+    """Return the sum of squares that a regression leaves."""
+    basis = np.linalg.qr(columns)[0]
+    along = np.einsum("nk,n->k", basis, y)
+    return float(((y - np.einsum("nk,k->n", basis, along)) ** 2).sum())
+
+
+def _independent(signal: SignalFit) -> float:
+    """Return how many independent errors a signal's samples are worth to its scale.
 
     Of two series of n samples with the autocorrelations a and b, the correlation varies as if there were
     n / (1 + 2 sum (1 - l/n) a_l b_l) independent ones (Bartlett 1935); here they are residual and simulated signal.
     """
-    number = 0.0
-    for signal in fit.signals:
-        n = len(signal.residual)
-        products = _autocorrelation(signal.residual) * _autocorrelation(signal.simulated)
-        number += n / max(1.0, 1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, n) / n) * products[1:])))
-    return number
+    return _worth(signal.residual, signal.simulated)
+
+
+def _independent_by_chance(signal: SignalFit) -> float:
+    """Return how many it would be worth if it had nothing to do with the simulated signal.
+
+    Then all of it is error. What fits to noise, or nearly, is like the simulated signal down to what is not: only
+    where residuals are large and coloured is it asked how often two such signals are that much alike.
+    """
+    number, n = _independent(signal), len(signal.residual)
+    explained = 1.0 - float(np.exp(-2.0 * signal.gain / n))
+    if number > _WHITE * n or explained > _ALIKE:
+        return number
+    return min(number, _worth(signal.measured, signal.simulated))
+
+
+def _worth(first: Floats, second: Floats) -> float:
+    n = len(first)
+    products = _autocorrelation(first) * _autocorrelation(second)
+    return n / max(1.0, 1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, n) / n) * products[1:])))
 
 
 def _autocorrelation(values: Floats) -> Floats:

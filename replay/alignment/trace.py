@@ -95,7 +95,10 @@ def trace_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> 
     if taken is None:
         return "the measured signal is constant"
     lines, at_frames = slopes(time, simulated)
-    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, line_errors(simulated))
+    bends = line_errors(simulated)
+    if pair.steps:
+        bends = np.maximum(bends, np.nan_to_num(np.abs(lines)) * np.diff(time) / np.sqrt(12.0))
+    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, bends)
 
 
 def frames_of(pair: SignalPair) -> tuple[Floats, Floats]:
@@ -130,7 +133,8 @@ def _likely(value: Floats, measured: Floats) -> Flags:
 def _softened(time: Floats, value: Floats, interval: float) -> Floats:
     """Return a signal of steps with ramps of twice the time between samples, so that some samples lie on each.
 
-    A step between two frames is half-way between them in the mean, where the middle of the ramp is.
+    A step between two frames is half-way between them in the mean, where the middle of the ramp is; anywhere else it
+    is as likely.
     """
     half = int(np.ceil(interval / float(np.median(np.diff(time)))))
     there = np.isfinite(value)

@@ -14,8 +14,7 @@ from replay.batch.watch import Watch
 from replay.comparison.measured.result import MeasuredComparison
 from replay.comparison.measured.source import MeasuredSource, compare_recording, load_map
 from replay.comparison.rules import Rules
-from replay.errors import InvalidValue, ScenarioError
-from replay.scenario import measured_log
+from replay.errors import InvalidValue
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 
@@ -59,13 +58,13 @@ def compare_all(
     if mapping is not None and log is None:
         raise InvalidValue("--map", mapping, "says what a log measures: name the log with --measured")
     scenarios = load_all([path])
-    sources = {scenario.name: _source(scenario, log, mapping) for scenario in scenarios}
+    source = _source(scenarios[0], log, mapping)
     if path.name.lower().endswith(RECORDINGS):
         for option, value in (("--model", model), ("--output", output)):
             if value is not None:
                 raise InvalidValue("SCENARIO", path, f"is a recording, which is not run again: {option} has no effect")
         name = scenarios[0].name
-        found = compare_recording(path, source=sources[name], rules=rules)
+        found = compare_recording(path, source=source, rules=rules)
         visit(path, found, False)
         yield ComparedCase(name, found)
         return
@@ -80,26 +79,23 @@ def compare_all(
             if result.recordings is None or not result.status.recorded:
                 yield ComparedCase(result.name, None, result.error)
             else:
-                found = compare_recording(result.recordings.mcap, source=sources[result.name], rules=rules)
+                found = compare_recording(result.recordings.mcap, source=source, rules=rules)
                 visit(result.recordings.mcap, found, len(scenarios) > 1)
                 yield ComparedCase(result.name, found)
 
 
-def _source(scenario: Scenario, log: Path | None, mapping: Path | None) -> MeasuredSource:
-    """Return the log to compare with, whose channels have been looked for."""
-    own = MeasuredSource.of_scenario(scenario)
+def _source(scenario: Scenario, log: Path | None, mapping: Path | None) -> MeasuredSource | None:
+    """Return the log beside a scenario, read before anything is run; None for the one that each scenario names."""
     if log is None:
-        if own is None:
+        if scenario.measured is None:
             rule = "names no log of the machine: give it a `measured`, or name the log with --measured and --map"
             raise InvalidValue("SCENARIO", scenario.name, rule)
-        return own
+        return None
     if mapping is not None:
         source = MeasuredSource.of_files(log, *load_map(mapping))
-    elif own is not None:
-        source = MeasuredSource.of_files(log, own.written, own.problem)
+    elif scenario.measured is not None:
+        source = MeasuredSource.of_files(log, scenario.measured, scenario.provenance.problem)
     else:
         raise InvalidValue("--measured", log, "needs --map, which says what of it measures which signals")
-    found = measured_log.read(scenario, source.written, source.library, source.name, source.problem)
-    if found.problems:
-        raise ScenarioError(found.problems)
+    source.read(scenario)
     return source

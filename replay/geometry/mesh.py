@@ -115,7 +115,7 @@ def solid_from_triangles(triangles: Floats) -> Solid:
             found, before = sides(faces), joints
             joints = topology(found)
             notes.append(_on_welding(points, taken_for, f"which closed {_closed_edges(before, joints)}"))
-    known, taken_for = faces, weld_copies(points, faces, flat)
+    known, taken_for = faces, weld_copies(points, faces, flat, closed=joints.is_closed)
     if (taken_for != np.arange(len(points))).any():
         faces = taken_for[faces]
         notes.append(_on_welding(points, taken_for, "so that triangles repeat"))
@@ -138,6 +138,9 @@ def solid_from_triangles(triangles: Floats) -> Solid:
         joints = topology(sides(faces))
         notes.append(f"{count} triangles were wound against their neighbours and turned over")
     faces = faces[~flat]
+    if not len(faces):
+        rule = "have no area that is not lost beside the largest of their coordinates"
+        raise InvalidValue("triangles", len(triangles), rule)
     turned = inside_out(points[faces], parts._replace(label=parts.label[~flat]))
     if turned.inside_out:
         faces = np.where(turned.faces[:, None], faces[:, [0, 2, 1]], faces)

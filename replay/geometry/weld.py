@@ -85,25 +85,33 @@ def _welded(
         allowed &= useful
 
 
-def weld_copies(points: Floats, faces: Integers, flat: Flags) -> Integers:
+def weld_copies(points: Floats, faces: Integers, flat: Flags, *, closed: bool) -> Integers:
     """Return the corner that each corner (p,) is taken for, itself for most: triangles are seen to be copies then.
 
     Corners become one if the rounding of doubles has parted them, no triangle that has an area loses it, and there are
-    more copies among the triangles then (see `copies`). Arguments as of `weld`.
+    more copies among the triangles then (see `copies`). What a few products have parted becomes one, unless the surface
+    is `closed`, if fewer edges are open without the copies. Other arguments as of `weld`.
     """
     from scipy.spatial import cKDTree
 
     itself, named = np.arange(len(points)), np.zeros(len(points), dtype=np.bool_)
     named[faces] = True
-    used, reach = np.flatnonzero(named), _ROUNDING * _extent(points)
+    used = np.flatnonzero(named)
     tree = cKDTree(points[used], balanced_tree=False, compact_nodes=False)
-    pairs = used[tree.query_pairs(reach, output_type="ndarray")]
-    if len(pairs) == 0:
-        return itself
-    group = components(len(points), pairs)
-    allowed = _small(points, group, reach, faces[~flat])
-    trial = _merged(group, allowed, np.bincount(faces.ravel(), minlength=len(points)))
-    return trial if _copies(points, trial[faces]) > _copies(points, faces) else itself
+    for tolerance in TOLERANCES[: 1 if closed else 2]:
+        reach = tolerance * _extent(points)
+        if tolerance > _ROUNDING and tree.count_neighbors(tree, reach) > _CROWD * len(used):
+            break
+        pairs = used[tree.query_pairs(reach, output_type="ndarray")]
+        if len(pairs) == 0:
+            continue
+        group = components(len(points), pairs)
+        allowed = _small(points, group, reach, faces[~flat])
+        trial = _merged(group, allowed, np.bincount(faces.ravel(), minlength=len(points)))
+        (copied, open_), (copied_then, open_then) = _copies(points, faces), _copies(points, trial[faces])
+        if copied_then > copied and (tolerance == _ROUNDING or open_then < open_):
+            return trial
+    return itself
 
 
 def _extent(points: Floats) -> float:
@@ -111,8 +119,11 @@ def _extent(points: Floats) -> float:
     return float(np.max(upper - lower))
 
 
-def _copies(points: Floats, faces: Integers) -> int:
-    return int(np.count_nonzero(copies(alike(points, faces).faces)))
+def _copies(points: Floats, faces: Integers) -> tuple[int, int]:
+    """Return how many faces are copies, and how many edges are open without them."""
+    cut = alike(points, faces).faces
+    again = copies(cut)
+    return int(np.count_nonzero(again)), int(np.count_nonzero(sides(cut[~again]).number % 2))
 
 
 def _small(points: Floats, group: Integers, reach: float, faces: Integers) -> Flags:

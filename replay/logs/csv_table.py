@@ -47,6 +47,7 @@ class CsvTable:
     """The cells of a file.
 
     Attributes:
+        begin: number of lines before the first row.
         separator: between its cells.
         headings: by column; "" for none.
         time: heading of the times.
@@ -183,6 +184,11 @@ def _holds_data(line: str) -> bool:
 def is_excerpt(data: bytes) -> bool:
     """Return whether a file says that it was cut out of another one."""
     return data.startswith(f"# {EXCERPT} of ".encode())
+
+
+def noted(origin: Mapping[str, str]) -> str:
+    """Return the first line of an excerpt, which says where it comes from."""
+    return f"# {EXCERPT} of {origin.get('name', '')}, sha256 {origin.get('sha256', '')}\n"
 
 
 def _origin(line: str) -> dict[str, str]:

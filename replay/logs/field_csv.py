@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from replay.errors import RecordingError
+from replay.logs.csv_long import LongNumbers, is_long
 from replay.logs.csv_table import CsvTable, Format
 from replay.logs.field_log import FieldLog, Window, in_order, in_window
 from replay.logs.joint_csv import CsvNumbers
@@ -33,8 +34,12 @@ def read_columns(
     Raises:
         RecordingError: as `read_csv`; or there is no such column, or no number in it, or two for one moment.
     """
-    table = CsvTable(name, data, format)
-    numbers = CsvNumbers(name, table, format, headings, max_gap, readings=True)
+    numbers = (
+        LongNumbers(name, data, format, headings, max_gap)
+        if is_long(data)
+        else CsvNumbers(name, CsvTable(name, data, format), format, headings, max_gap, readings=True)
+    )
+    table = numbers.table
     series = {}
     for heading in headings:
         if heading not in table.headings or heading == table.time:

@@ -50,7 +50,7 @@ class FieldLog:
         origin: the note that a log carries which was cut out of another one; else empty.
     """
 
-    series: Mapping[Place, FieldSeries]
+    series: dict[Place, FieldSeries]
     begin: int
     left_out: int
     cut: Callable[[Window | None, Mapping[str, str]], bytes]

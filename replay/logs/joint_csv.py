@@ -13,11 +13,10 @@ from fractions import Fraction
 import numpy as np
 
 from replay.errors import RecordingError
-from replay.logs.csv_table import CsvTable, Format, unit_of
-from replay.logs.excerpt import EXCERPT
+from replay.logs.csv_table import CsvTable, Format, noted, unit_of
 from replay.logs.joint_log import JointLog, Series, leading_zeros, unrepeated
 from replay.logs.times import date_nanoseconds, nanoseconds
-from replay.numerics.arrays import Floats
+from replay.numerics.arrays import Floats, Integers
 
 _WITH_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?")
 _WITH_POINT = re.compile(r"[-+]?[0-9]*\.[0-9]*([eE][-+]?[0-9]+)?")
@@ -51,6 +50,7 @@ class CsvNumbers:
     """The numbers of a table.
 
     Attributes:
+        table: its cells.
         times: of its rows [ns].
         skip: leading rows that are left out: their times are 0, as before a clock is there.
         headings: of the columns that are needed.
@@ -75,18 +75,19 @@ class CsvNumbers:
         """
         self._name = name
         self._readings = readings
-        self._table = table
+        self.table = table
         self._format = format
         self.headings = {h for h in table.headings if h in needed or (_joint(h) in needed and not readings)}
         self._at = table.headings.index(table.time)
         self._decimal = format.decimal or self._found_decimal()
         self._unit = self._time_unit()
-        self.times = self._read_times()
+        self._zones: set[str] = set()
+        self.times = self._read_times(table.columns[self._at], 0)
         self.skip = leading_zeros(self.times, max_gap)
 
     def log(self) -> JointLog:
         """Return all columns that hold numbers as joints."""
-        table, times = self._table, self.times
+        table, times = self.table, self.times
         joints = {}
         for column, heading in enumerate(table.headings):
             if heading and column != self._at:
@@ -112,26 +113,29 @@ class CsvNumbers:
 
     def series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column; None without any, or if it holds something else and is not needed."""
-        cells = self._table.columns[column]
+        cells = self.table.columns[column]
         row = np.array([k for k in range(self.skip, len(cells)) if cells[k]], dtype=np.int64)
-        known = [cells[k] for k in row.tolist()]
-        values = _values(known, self._decimal, _WORDS if self._readings else {})
-        wrong = np.flatnonzero(~np.isfinite(values))
-        if self._readings:
-            wrong = np.array([k for k in wrong.tolist() if not _NOT_FINITE.fullmatch(known[k])], dtype=np.int64)
-        if len(wrong) and heading in self.headings:
-            index = int(row[wrong[0]])
-            raise RecordingError(self._name, self._no_number(index, heading, cells[index]))
-        if len(wrong) or not len(row):
+        values = self._checked(row, [cells[k] for k in row.tolist()], heading)
+        if values is None or not len(row):
             return None
         time = np.array(self.times, dtype=np.int64)[row]
         first = unrepeated(time, values)
         return Series(time[first], values[first], row[first])
 
+    def _checked(self, row: Integers, cells: Sequence[str], heading: str) -> Floats | None:
+        """Return the numbers in cells of some rows; None if they hold something else and the column is not needed."""
+        values = _values(cells, self._decimal, _WORDS if self._readings else {})
+        wrong = np.flatnonzero(~np.isfinite(values)).tolist()
+        if self._readings:
+            wrong = [k for k in wrong if not _NOT_FINITE.fullmatch(cells[k])]
+        if wrong and heading in self.headings:
+            raise RecordingError(self._name, self._no_number(int(row[wrong[0]]), heading, cells[wrong[0]]))
+        return None if wrong else values
+
     def _found_decimal(self) -> str:
         """Return the sign between whole and decimal digits: a comma where numbers have one and none has a point."""
-        read = {*self.headings, self._table.time}
-        columns = [c for h, c in zip(self._table.headings, self._table.columns, strict=True) if h in read]
+        read = {*self.headings, self.table.time}
+        columns = [c for h, c in zip(self.table.headings, self.table.columns, strict=True) if h in read]
         comma = self._first_line(columns, ",", _WITH_COMMA)
         if comma is None:
             return "."
@@ -145,23 +149,24 @@ class CsvNumbers:
         """Return the first line with a cell of a form, which has a sign in it."""
         if not any(sign in cell for column in columns for cell in column):
             return None
-        rows = zip(self._table.lines, *columns, strict=True)
+        rows = zip(self.table.lines, *columns, strict=True)
         return next((line for line, *cells in rows if any(map(form.fullmatch, cells))), None)
 
     def _time_unit(self) -> Fraction:
-        unit = self._format.unit or unit_of(self._table.time)[1]
+        unit = self._format.unit or unit_of(self.table.time)[1]
         return self._format.units.get(unit, self._format.units["s"])
 
-    def _read_times(self) -> list[int]:
-        times, zones = [], set()
-        for index, cell in enumerate(self._table.columns[self._at]):
+    def _read_times(self, cells: Sequence[str], row: int) -> list[int]:
+        """Return the times [ns] in cells, of which the first is that of a row."""
+        times, zones = [], self._zones
+        for index, cell in enumerate(cells, row):
             try:
                 time = nanoseconds(cell.replace(",", ".") if self._decimal == "," else cell, self._unit)
                 kind = ""
                 if time is None:
                     date = date_nanoseconds(cell)
                     if date is None:
-                        raise RecordingError(self._name, self._no_number(index, self._table.time, cell))
+                        raise RecordingError(self._name, self._no_number(index, self.table.time, cell))
                     time, kind = date[0], "with" if date[1] else "without"
             except OverflowError:
                 raise RecordingError(self._name, f"{self._place(index)}: {cell[:60]} is beyond 146 years") from None
@@ -179,11 +184,15 @@ class CsvNumbers:
         return times
 
     def _place(self, index: int) -> str:
-        return f"line {self._table.lines[index]}, column {self._table.time!r}"
+        return f"line {self._line(index)}, column {self.table.time!r}"
+
+    def _line(self, row: int) -> int:
+        """Return the number of the line that a row is in."""
+        return self.table.lines[row]
 
     def _no_number(self, index: int, heading: str, cell: str) -> str:
-        rule = f"line {self._table.lines[index]}, column {heading!r}: {cell[:60]!r} is not a finite number"
-        if heading == self._table.time and _DATE_LIKE.match(cell):
+        rule = f"line {self._line(index)}, column {heading!r}: {cell[:60]!r} is not a finite number"
+        if heading == self.table.time and _DATE_LIKE.match(cell):
             return f"{rule} or a date such as 2024-05-01T12:00:00.5Z"
         if "," in cell and "." in cell:
             return f"{rule}; leave out the marks between thousands"
@@ -195,13 +204,13 @@ class CsvNumbers:
 
     def cut(self, rows: Sequence[int], origin: Mapping[str, str], also: Collection[str] = ()) -> bytes:
         """Return some lines and the columns that were needed, and others, cell by cell as they are written."""
-        kept = {self._table.time, *self.headings, *also}
-        columns = [k for k, h in enumerate(self._table.headings) if h in kept]
+        kept = {self.table.time, *self.headings, *also}
+        columns = [k for k, h in enumerate(self.table.headings) if h in kept]
         out = io.StringIO()
-        out.write(f"# {EXCERPT} of {origin.get('name', '')}, sha256 {origin.get('sha256', '')}\n")
-        writer = csv.writer(out, delimiter=self._table.separator, lineterminator="\n")
-        writer.writerow([self._table.headings[k] for k in columns])
-        writer.writerows([[self._table.columns[k][index] for k in columns] for index in rows])
+        out.write(noted(origin))
+        writer = csv.writer(out, delimiter=self.table.separator, lineterminator="\n")
+        writer.writerow([self.table.headings[k] for k in columns])
+        writer.writerows([[self.table.columns[k][index] for k in columns] for index in rows])
         return out.getvalue().encode()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -20,8 +21,8 @@ from replay.logs.joint_log import EPOCH
 from replay.logs.message_log import open_message_log
 from replay.numerics.arrays import Floats, Integers
 from replay.scenario.log_file import LogFile, csv_format, open_log, reading
-from replay.scenario.measured_signals import dimension_of, unit_of
-from replay.scenario.recorded_series import Unusable
+from replay.scenario.measured_signals import continuous_positions, dimension_of, unit_of
+from replay.scenario.recorded_series import Unusable, unwrapped
 from replay.scenario.source import Library
 
 if TYPE_CHECKING:
@@ -43,10 +44,12 @@ class MeasuredSeries:
     Attributes:
         time: (n,) [s] on the log's clock, increasing.
         value: (n,) in SI; NaN where nothing was detected.
+        turn: angles [rad] that are so far apart are one, as the encoder of a continuous joint has them; 0 for none.
     """
 
     time: Floats
     value: Floats
+    turn: float = 0.0
 
 
 @dataclass
@@ -125,12 +128,21 @@ def read(
     found._file = file if log.origin else None
     found._cut = log.cut
     seconds: dict[int, Floats] = {}
+    continuous = continuous_positions(scenario)
+    left = Counter(places.values())
     for signal, part in written.signals.items():
-        series = log.series[places[signal]]
+        place = places[signal]
+        left[place] -= 1
+        series = log.series[place] if left[place] else log.series.pop(place)  # logs may be large
         shared = seconds.setdefault(id(series.time), _seconds(series.time, found.zero, found._window))
         factor = _factor(unit_of(scenario, signal), part)
-        value = series.value[_inside(series.time, found._window)]
-        found.series[signal] = MeasuredSeries(shared, _converted(value, part, factor))
+        value = _converted(series.value[_inside(series.time, found._window)], part, factor)
+        turn = math.tau if signal in continuous else 0.0
+        if turn:
+            there = np.isfinite(value)
+            value = value.copy()
+            value[there] = unwrapped(value[there], turn)
+        found.series[signal] = MeasuredSeries(shared, value, turn)
     return found
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 EVENTS = "/events"
 """Begins the name of a signal that is true while what an event tells lasts: `/events/contact/arm/rod|table/top`."""
+_POSITION = "/joint_states/position/"
 _DIMENSIONS = {dimension.si: dimension for dimension in DIMENSIONS}
 
 
@@ -40,6 +41,15 @@ def unit_of(scenario: Scenario, name: str) -> str:
     raise ValueError(f"is no signal of the recording; {did_you_mean(name, known, what='signals are')}")
 
 
+def continuous_positions(scenario: Scenario) -> set[str]:
+    """Return the full names of positions of continuous joints, whose encoders begin anew every turn."""
+    return {
+        f"{_POSITION}{part.joint.name or link}"
+        for link, part in scenario.links.items()
+        if part.joint.type == "continuous"
+    }
+
+
 def dimension_of(unit: str) -> Dimension | None:
     """Return the dimension that a unit is the SI unit of; None for ""."""
     return _DIMENSIONS.get(unit)
@@ -55,7 +65,7 @@ def _told(scenario: Scenario) -> Iterator[tuple[str, str]]:
     for link, part in scenario.links.items():
         if part.joint.type in SCALAR_JOINTS:
             unit = "m" if part.joint.type == "prismatic" else "rad"
-            yield f"/joint_states/position/{part.joint.name or link}", unit
+            yield f"{_POSITION}{part.joint.name or link}", unit
             yield f"/joint_states/velocity/{part.joint.name or link}", f"{unit}/s"
     for link in scenario.links:
         for axis in "xyz":

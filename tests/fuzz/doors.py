@@ -30,6 +30,7 @@ from replay.recording.reader import read
 from replay.recording.record import RecordedPaths
 from replay.scenario.load import load_cases, load_model, load_sources
 from tests.fuzz import damage
+from tests.fuzz.compare_doors import CompareDoors
 from tests.fuzz.door import Door, command
 from tests.fuzz.night_doors import NightDoors
 from tests.fuzz.robot_doors import robot_doors
@@ -191,6 +192,7 @@ class House:
             **robot_doors(),
             **RunDoors(self.folder, SCENARIO).doors(),
             **NightDoors(self.folder).doors(),
+            **CompareDoors(self.folder).doors(),
         }
 
     def _text(self, name: str, whole: bytes) -> Callable[[random.Random], dict[str, bytes]]:

@@ -135,3 +135,18 @@ def test_copies_that_rounding_has_parted_are_seen(sense) -> None:
         assert "taken for it" in told and "triangles repeat another one" in told
     apart = solid_from_triangles(np.concatenate([ball, ball + 1e-9]))  # a thin wall stays
     assert len(apart.triangles) == 2 * len(ball)
+
+
+def test_a_copy_parted_by_a_few_products_leaves_a_body_closed() -> None:
+    # a robot's body was "open": two corners of a quad that was there twice were 8e-12 of its extent apart
+    cube = primitives.cube(1.0).triangles
+    points, faces = np.unique(cube.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    for side in (faces[:2], faces[4:6], faces[:4]):
+        named = np.unique(side)
+        for moved in (named[:2], named[-2:], named[:1]):
+            corners = points.copy()
+            corners[moved] += 8e-12
+            solid = solid_from_triangles(np.concatenate([cube, corners[side]]))
+            assert solid.watertight and len(solid.triangles) == 12 and solid.volume == pytest.approx(1.0)
+            assert "triangles repeat another one" in " ".join(solid.notes)

@@ -254,6 +254,29 @@ def test_flat_stitch_keeps_the_surface_closed() -> None:
     assert solid.dropped == 1 and solid.watertight and solid.volume == pytest.approx(1.0)
 
 
+ONE_CORNER_FAR_AWAY = b"""
+v -3.15267548e+28 -1.64735003e+21 -8.87158197e+19
+v -0.5 -0.5 -0.5
+v -0.5 -0.5 0.5
+v -0.5 0.5 9.77601875e+12
+v -3.62209610e-18 5.08598007e-35 -1.17151140e+27
+v 9.55788053e-21 -0.5 -0.5
+v 0.5 0.5 0.5
+f 3 1 2
+f 5 3 2
+f 2 1 4
+f 4 5 2
+f 3 3 1
+f 6 3 5
+f 6 3 3
+f 1 3 4
+f 7 5 4
+f 4 3 7
+f 7 6 5
+f 3 6 7
+"""
+
+
 @pytest.mark.parametrize(
     "name, data, words",
     [
@@ -263,6 +286,7 @@ def test_flat_stitch_keeps_the_surface_closed() -> None:
         ("body.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "holds no triangles"),
         ("body.obj", b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "1 of 1 triangles have a corner that is not finite"),
         ("body.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its 1 triangles has an area"),
+        ("body.obj", ONE_CORNER_FAR_AWAY, "have no area that is not lost beside the largest of their coordinates"),
     ],
 )
 def test_refused_in_one_line(name: str, data: bytes, words: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from replay.alignment.clock import ClockEstimate, LogClock, Undetermined
 from replay.alignment.estimate import estimate_clock
 from replay.alignment.hints import hints
-from replay.alignment.pair import SignalPair, fitted
+from replay.alignment.pair import SignalPair, fitted, on_same_turn
 from replay.alignment.residuals import SampledFrames, match
 from replay.alignment.statistics import statistics
 from replay.comparison.columns import MatchedFrames, compare_groups
@@ -73,7 +73,15 @@ def compare(
     }
     clocks = {name: _clock(name, written, pairs, log.zero, problem) for name in written.clock_names()}
     signals = tuple(
-        _signal(recording.time, simulated[name], pairs[name], clocks[part.clock], part.fit, written.max_gap, mine)
+        _signal(
+            recording.time,
+            simulated[name],
+            _turned(pairs[name], clocks[part.clock].used, log.series[name].turn),
+            clocks[part.clock],
+            part.fit,
+            written.max_gap,
+            mine,
+        )
         for name, part in written.signals.items()
     )
     return MeasuredComparison(
@@ -84,6 +92,10 @@ def compare(
         signals=signals,
         difference=_difference(recording.provenance.scenario, signals, mine),
     )
+
+
+def _turned(pair: SignalPair, clock: LogClock, turn: float) -> SignalPair:
+    return on_same_turn(pair, clock, turn) if turn else pair
 
 
 def _clock(

@@ -18,6 +18,7 @@ from replay.recording.reader import own_topics, read, read_files, read_provenanc
 from replay.scenario import measured_log
 from replay.scenario.load import load_sources
 from replay.scenario.measured import MeasuredMapPart
+from replay.scenario.measured_log import MeasuredLog
 from replay.scenario.measured_signals import EVENTS
 from replay.scenario.model import Scenario
 from replay.scenario.problems import translate
@@ -25,7 +26,7 @@ from replay.scenario.source import Attached, Folder, Library, problem_at
 from replay.scenario.yaml_file import read_yaml
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class MeasuredSource:
     """A log of the machine, and what of it measures which signals.
 
@@ -39,6 +40,25 @@ class MeasuredSource:
     library: Library
     name: str
     problem: Callable[[KeyPath, str], Problem]
+    _read: tuple[str, MeasuredLog] | None = None
+
+    def read(self, scenario: Scenario) -> None:
+        """Read the log for a scenario, before it is run; errors as of `take`."""
+        self._read = scenario.name, self.take(scenario)
+
+    def take(self, scenario: Scenario) -> MeasuredLog:
+        """Return what the log says of a scenario's signals, once if it is read already: logs may be large.
+
+        Raises:
+            ScenarioError: the log cannot be used.
+        """
+        kept, self._read = self._read, None
+        if kept is not None and kept[0] == scenario.name:
+            return kept[1]
+        log = measured_log.read(scenario, self.written, self.library, self.name, self.problem).without_file()
+        if log.problems:
+            raise ScenarioError(log.problems)
+        return log
 
     @staticmethod
     def of_scenario(scenario: Scenario) -> MeasuredSource | None:
@@ -110,9 +130,7 @@ def compare_scenario(
     path: str | Path, scenario: Scenario, source: MeasuredSource, *, rules: Rules | None = None
 ) -> MeasuredComparison:
     """Return what the recording of a scenario says beside a log of the machine; errors as of `compare_recording`."""
-    log = measured_log.read(scenario, source.written, source.library, source.name, source.problem).without_file()
-    if log.problems:
-        raise ScenarioError(log.problems)
+    log = source.take(scenario)
     with McapLog(path) as file:
         topics = {channel.topic for channel in file.channels.values()} & own_topics(read_provenance(file).layout)
     recording = read(path, topics=_needed(topics, source.written))

@@ -9,6 +9,8 @@ from replay.comparison.difference import DiffVerdict
 from replay.comparison.measured.source import MeasuredSource, compare_recording, load_map
 from replay.comparison.rules_file import read_rules
 from replay.errors import ScenarioError, UndeterminedClockError
+from replay.recording.record import record
+from replay.scenario.load import load
 from tests.comparison.measured import machine
 
 
@@ -142,3 +144,52 @@ def test_a_signal_that_the_recording_lacks_is_refused(swing, tmp_path):
     text = machine.OF_CSV.replace("/events/detection/tip", "/collision/clearance/a|b")
     with pytest.raises(ScenarioError, match=r"map\.yaml:6:3: signals\..* is no signal of the recording"):
         beside(swing, log, text)
+
+
+def test_an_encoder_that_begins_anew_every_turn_is_on_the_turn_of_the_simulation(tmp_path):
+    """The joint rests at 0 first, where noise makes it jump between 0 and 360 deg; later a turn is lost in a gap."""
+    limited = "revolute, axis: [0, 1, 0], lower: -100 deg, upper: 100 deg"
+    lines = machine.csv_log(tmp_path / "plain.csv").read_text().splitlines()
+    rows = [line.split(";") for line in lines[1:]]
+    turned = [[t, d, str(float(a) % 360.0 if k < 100 else float(a) + 720.0), n] for k, (t, d, a, n) in enumerate(rows)]
+    assert sum(float(row[2]) > 359.0 for row in turned) > 5
+    (tmp_path / "run.csv").write_text("\n".join([lines[0], *map(";".join, turned[:98] + turned[102:])]))
+    measured = """
+measured:
+  file: run.csv
+  time: {column: t_ms, unit: ms}
+  signals: {/joint_states/position/swing: {column: "angle [deg]"}}
+"""
+    (tmp_path / "swing.yaml").write_text(machine.SCENARIO.replace(limited, "continuous, axis: [0, 1, 0]") + measured)
+    found = compare_recording(record(load(tmp_path / "swing.yaml"), tmp_path / "run", rrd=False).mcap)
+    low, high = found.clocks[0].told.offset_interval
+    assert low <= machine.OFFSET <= high
+    numbers = found.signals[0].statistics
+    assert numbers.rms == pytest.approx(math.radians(0.05), rel=0.3)
+    assert abs(numbers.largest) < math.radians(0.5)
+
+
+def test_a_number_that_stands_for_nothing_is_hinted_at(swing, tmp_path):
+    log = tmp_path / "run.csv"
+    log.write_text(machine.csv_log(tmp_path / "plain.csv").read_text().replace(";-1;", ";0;"))
+    text = machine.OF_CSV.replace(", nothing: -1", "")
+    plain = of(beside(swing, log, text), "/distance/tip/distance")
+    mapped = of(beside(swing, log, text.replace("unit: mm", "unit: mm, nothing: 0")), "/distance/tip/distance")
+    assert "are exactly 0, far from all others" in plain.hints[0] and "state it as `nothing`" in plain.hints[0]
+    assert (
+        not mapped.hints and mapped.matched.only_measured + mapped.matched.only_simulated < plain.matched.only_measured
+    )
+
+
+@pytest.mark.parametrize("kind", ["csv", "mcap"])
+def test_a_log_beside_a_scenario_is_read_once(swing, tmp_path, kind, monkeypatch):
+    from replay.batch.compare import compare_all
+    from replay.scenario import measured_log
+
+    reads = []
+    plain = measured_log.read
+    monkeypatch.setattr(measured_log, "read", lambda *given: reads.append(given) or plain(*given))
+    given = {"log": swing / f"run.{kind}", "mapping": swing / f"{kind}_map.yaml"}
+    (case,) = compare_all(record(load(swing / "plain.yaml"), tmp_path, rrd=False).mcap, **given)
+    assert case.found is not None
+    assert len(reads) == 1
