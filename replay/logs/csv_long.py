@@ -67,7 +67,8 @@ class LongNumbers(CsvNumbers):
 
     def series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column, once; columns without empty cells share their times."""
-        values, there = (side.pop(column)[: len(self._time)] for side in (self._values, self._there))
+        count = len(self._time)
+        values, there = self._values.pop(column)[:count], self._there.pop(column)[:count]
         there[: self.skip] = False
         if there.all():
             time, row = self._time, np.arange(len(values))
