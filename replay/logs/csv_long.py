@@ -42,8 +42,8 @@ class LongNumbers(CsvNumbers):
                 quotes or another number of cells.
         """
         head = CsvTable(name, data[: data.rfind(b"\n", 0, _HEAD) + 1], format)
-        super().__init__(name, head, format, needed, max_gap, readings=True)
         self._data = data
+        super().__init__(name, head, format, needed, max_gap, readings=True)
         columns = [head.headings.index(heading) for heading in sorted(self.headings - {head.time})]
         if len(data) > limits.LONG_LOG:
             raise RecordingError(name, f"has {len(data)} bytes; at most {limits.LONG_LOG} of a CSV are read")
