@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -54,6 +55,11 @@ class Trend:
     accepted: tuple[bool, ...]
     failing: tuple[frozenset[str], ...]
     curves: tuple[NightCurve, ...]
+
+    @functools.cached_property
+    def nights(self) -> tuple[str, ...]:
+        """What people call the nights."""
+        return tuple(time[:16].replace("T", " ") for time in self.times)
 
 
 def read_trend(history: Path, *, measures: Iterable[str] = (), scenarios: Iterable[str] = ()) -> Trend:
@@ -163,7 +169,7 @@ def _drawing(trend: Trend, curve: NightCurve) -> _Drawing:
             (
                 x,
                 y,
-                f"{trend.times[k]}: {quantities.shown(value, curve.unit, digits=6)}",
+                f"{trend.nights[k]}: {quantities.shown(value, curve.unit, digits=6)}",
                 curve.scenario in trend.failing[k],
             )
         )

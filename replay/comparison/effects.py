@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from replay.collision.columns import CollisionColumns
 from replay.comparison import quantities
-from replay.comparison.difference import Difference, EventDifference, Fate, SignalDifference
+from replay.comparison.difference import Difference, Fate, SignalDifference
+from replay.comparison.event_wording import at_time, lone_contact, most_shifted, shifted, worst_event
 from replay.comparison.rules import EXACT
 from replay.errors import count
 from replay.guarding.columns import GuardColumns
@@ -138,7 +139,7 @@ def _moment(item: SignalDifference) -> float:
     """Return when a signal differs in the way that matters: at the event that is told, or its worst value."""
     wrong = [event for event in item.events if not event.allowed]
     if wrong:
-        told = next((event for event in wrong if event.fate is not Fate.SHIFTED), _most_shifted(wrong))
+        told = next((event for event in wrong if event.fate is not Fate.SHIFTED), most_shifted(wrong))
         at = told.candidate or told.baseline
         assert at is not None
         return at.time
@@ -171,11 +172,11 @@ def _pair(items: Sequence[SignalDifference], limit: float | None) -> tuple[Sever
         contacts = [event for event in level.events if event.what.startswith("contact ") and not event.allowed]
         alone = [event for event in contacts if event.fate is not Fate.SHIFTED]
         if alone:
-            return Severity.CONTACT, level, _lone_contact(alone)
+            return Severity.CONTACT, level, lone_contact(alone)
         if contacts:
-            return Severity.CONTACT_TIME, level, _shifted(_most_shifted(contacts))
+            return Severity.CONTACT_TIME, level, shifted(most_shifted(contacts))
     if "undecided" in by_field:
-        return Severity.CONTACT, by_field["undecided"], _event(by_field["undecided"])
+        return Severity.CONTACT, by_field["undecided"], worst_event(by_field["undecided"])
     clearance = by_field.get("clearance")
     if clearance is not None and (clearance.worst_abs is not None or clearance.nan):
         return Severity.CLEARANCE, clearance, _clearance(clearance, limit)
@@ -184,7 +185,7 @@ def _pair(items: Sequence[SignalDifference], limit: float | None) -> tuple[Sever
         bound = by_field.get("clearance_bound", near)
         return Severity.CLEARANCE, bound, _nearness(near, bound, limit)
     if level is not None:
-        return Severity.READING, level, _event(level)
+        return Severity.READING, level, worst_event(level)
     first = _first_of(items, _ABOUT_A_PAIR)
     return Severity.BOOKKEEPING, first, _any(first)
 
@@ -196,7 +197,7 @@ def _nearness(near: SignalDifference, bound: SignalDifference, limit: float | No
     assert at is not None
     comes = event.what.endswith(" begins") is (event.fate is Fate.APPEARED)
     proven = "clearance" if bound.least is None else f"proven clearance {quantities.change(*bound.least, 'm')},"
-    return f"{proven} {'comes within' if comes else 'leaves'} the margin at {_time(at.time)}{_expected(limit)}"
+    return f"{proven} {'comes within' if comes else 'leaves'} the margin at {at_time(at.time)}{_expected(limit)}"
 
 
 def _expected(limit: float | None) -> str:
@@ -211,7 +212,7 @@ def _clearance(item: SignalDifference, limit: float | None) -> str:
     tolerance = worst.error * 1e-3
     if least is not None and abs(least[0] - least[1]) > tolerance:
         return f"smallest clearance {quantities.change(*least, 'm')}{expected}"
-    return f"clearance {quantities.change(worst.baseline, worst.candidate, 'm')} at {_time(worst.at.time)}{expected}"
+    return f"clearance {quantities.change(worst.baseline, worst.candidate, 'm')} at {at_time(worst.at.time)}{expected}"
 
 
 def _sensor(items: Sequence[SignalDifference]) -> tuple[Severity, SignalDifference, str]:
@@ -222,7 +223,7 @@ def _sensor(items: Sequence[SignalDifference]) -> tuple[Severity, SignalDifferen
     states = [field.name for field in kind.columns.fields() if field.events or field.begins]
     gate = next((item for item in items if item.signal.field in gates and item.event_count), None)
     if gate is not None:
-        return Severity.READING, gate, _event(gate)
+        return Severity.READING, gate, worst_event(gate)
     for names in (main, states, other):
         chosen = [item for item in items if item.signal.field in names]
         if chosen:
@@ -250,12 +251,12 @@ def _first_of(items: Sequence[SignalDifference], fields: Sequence[str]) -> Signa
 def _any(item: SignalDifference) -> str:
     """Return how a signal differs in words and numbers."""
     if item.event_count:
-        return _event(item)
+        return worst_event(item)
     name = _label(item)
     if item.worst_abs is None:
-        return f"{name} has no number in one run, first at {_time(item.first.time)}"
+        return f"{name} has no number in one run, first at {at_time(item.first.time)}"
     worst = item.worst_abs
-    return f"{name} {quantities.signed(worst.candidate - worst.baseline, item.signal.unit)} at {_time(worst.at.time)}"
+    return f"{name} {quantities.signed(worst.candidate - worst.baseline, item.signal.unit)} at {at_time(worst.at.time)}"
 
 
 def _label(item: SignalDifference) -> str:
@@ -264,58 +265,6 @@ def _label(item: SignalDifference) -> str:
     columns = kind.columns if kind else CollisionColumns if item.signal.topic == _COLLISION else None
     spoken = {field.name: field.spoken for field in columns.fields()} if columns else {}
     return spoken.get(item.signal.field, item.signal.field.replace("_", " "))
-
-
-def _event(item: SignalDifference) -> str:
-    wrong = [event for event in item.events if not event.allowed] or list(item.events)
-    alone = [event for event in wrong if event.fate is not Fate.SHIFTED]
-    if not alone:
-        return _shifted(_most_shifted(wrong))
-    event = alone[0]
-    at = event.baseline or event.candidate
-    assert at is not None
-    what = event.what.removesuffix(" begins")
-    if event.what.endswith(" begins"):
-        return f"{what} {'appears' if event.fate is Fate.APPEARED else 'vanishes'}, {_when(event, at.time)}"
-    new = event.fate is Fate.APPEARED
-    if event.what.endswith(" ends"):
-        return f"{event.what.removesuffix(' ends')} {'ends' if new else 'no longer ends'} at {_time(at.time)}"
-    return f"{what} {'only in this run' if new else 'no longer'}, {_when(event, at.time)}"
-
-
-def _when(event: EventDifference, time: float) -> str:
-    return f"at {_time(time)}" if event.fate is Fate.APPEARED else f"was at {_time(time)}"
-
-
-def _lone_contact(events: Sequence[EventDifference]) -> str:
-    """Return "contact appears at 3.2 s, until 3.4 s" of beginnings and ends that one run has alone."""
-    first = next((event for event in events if event.what == "contact begins"), events[0])
-    at = first.baseline or first.candidate
-    assert at is not None
-    gone = first.fate is Fate.VANISHED
-    if first.what == "contact begins":
-        ends = (event for event in events if event.what == "contact ends" and event.fate is first.fate)
-        until = next((end for end in ((e.baseline or e.candidate) for e in ends) if end and end.time >= at.time), None)
-        ended = "" if until is None else f", until {_time(until.time)}"
-        return f"contact {'vanishes, was' if gone else 'appears'} at {_time(at.time)}{ended}"
-    return f"contact {'no longer ends, did' if gone else 'ends'} at {_time(at.time)}"
-
-
-def _most_shifted(events: Sequence[EventDifference]) -> EventDifference:
-    return max(events, key=lambda event: abs(event.shift or 0.0))
-
-
-def _shifted(event: EventDifference) -> str:
-    """Return "contact 33 ms later" of a beginning and "contact ends 33 ms later" of an end."""
-    shift = event.shift or 0.0
-    if not shift and event.shift_frames:
-        shift = float(event.shift_frames)
-    much = f"{quantities.shown(abs(shift), 's')} {'later' if shift > 0 else 'earlier'}"
-    return f"{event.what.removesuffix(' begins')} {much}"
-
-
-def _time(seconds: float) -> str:
-    return f"{seconds:.6g} s"
 
 
 def _absences(found: Difference) -> Iterator[Effect]:

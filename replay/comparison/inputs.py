@@ -96,19 +96,18 @@ def _placements(a: Placement, b: Placement, path: KeyPath) -> Iterator[str]:
 
 def _mappings(a: Mapping[Any, Any], b: Mapping[Any, Any], path: KeyPath, quantity: Quantity | None) -> Iterator[str]:
     """Yield how two mappings differ; parts that go and come again under another name are renamed."""
-    gone = {key: repr(value) for key, value in a.items() if key not in b and isinstance(value, BaseModel)}
-    renamed: dict[Any, Any] = {}
-    for new, value in b.items():
-        old = next((key for key, text in gone.items() if new not in a and text == repr(value)), None)
-        if old is not None:
-            del gone[old]
-            renamed[old] = new
+    gone: dict[str, list[Any]] = {}
+    for key, value in a.items():
+        if key not in b and isinstance(value, BaseModel):
+            gone.setdefault(repr(value), []).append(key)
+    renamed = {of.pop(0): key for key, value in b.items() if key not in a and (of := gone.get(repr(value)))}
+    new = set(renamed.values())
     for key in dict.fromkeys((*a, *b)):
         if key in a and key in b:
             yield from _changes(a[key], b[key], (*path, key), quantity)
         elif key in renamed:
             yield f"{_place((*path, key))} renamed {renamed[key]}"
-        elif key not in renamed.values():
+        elif key not in new:
             yield f"{_place((*path, key))} {'added' if key in b else 'removed'}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -81,6 +82,8 @@ def load_sources(main: str, sources: Mapping[str, bytes], *, case: str | None = 
     Raises:
         ScenarioError: as `load`; or there is no such case.
     """
+    if case is not None and case.endswith("]"):  # one of many, and others of them may follow
+        return _opened(main, tuple(sorted(sources.items()))).case(case)
     file = _File(Attached(main, sources))
     return file.scenario() if case is None else file.case(case)
 
@@ -114,6 +117,12 @@ def load_model(file_or_name: str | Path) -> Model:
         return Model.model_validate(builtin_model(root.data()))
     except ValidationError as error:
         raise ScenarioError(_in_order(translate(error, root, Model))) from None
+
+
+@functools.lru_cache(maxsize=2)
+def _opened(main: str, sources: tuple[tuple[str, bytes], ...]) -> _File:
+    """Return a file with a sweep: a baseline's and a candidate's are asked for one case after another."""
+    return _File(Attached(main, dict(sources)))
 
 
 class _File:
@@ -155,17 +164,24 @@ class _File:
 
     def case(self, name: str) -> Scenario:
         """Return the case of a name."""
+        sweep = self._root.child("sweep")
+        if sweep is None or self._cases_by_name is None or self._root.mapping["name"].value == name:
+            return self.scenario()  # which says what is wrong
+        if name not in self._cases_by_name:
+            raise ScenarioError([sweep.place.problem(f"the sweep has no case {name!r}")])
+        return self._case(self._cases_by_name[name])
+
+    @functools.cached_property
+    def _cases_by_name(self) -> dict[str, SweepCase] | None:
+        """The cases of the sweep; None where there is no valid one."""
         title, sweep = self._root.child("name"), self._root.child("sweep")
-        if title is None or not isinstance(title.value, str) or title.value == name or sweep is None:
-            return self.scenario()
+        if title is None or not isinstance(title.value, str) or sweep is None:
+            return None
         try:
             SweepPart.model_validate(sweep.data())
         except ValidationError:
-            return self.scenario()  # which says what is wrong
-        for case in cases(self._root, title.value):
-            if case.name == name:
-                return self._case(case)
-        raise ScenarioError([sweep.place.problem(f"the sweep has no case {name!r}")])
+            return None
+        return {case.name: case for case in cases(self._root, title.value)}
 
     def _case(self, case: SweepCase) -> Scenario:
         problems = list(self._problems)
