@@ -97,6 +97,8 @@ pictures: $(VENV)/.test system  ## make the README's pictures, most of them from
 	$(BIN)/python -m tests.pictures signal $(RECORDINGS)/.html /distance/corner_foot_left/distance scenarios/pictures/beside_the_machine.png
 
 soak: $(VENV)/.test  ## the long versions of the tests: millions of pairs, thousands of damaged files
+	$(call install,-e '.[test,soak]')
+	$(call install,--no-deps example-robot-data)
 	$(BIN)/python -m pytest -m soak
 
 plain: $(VENV)/.test  ## every test with kernels as plain Python, as in a debugger; those that take long so with fewer cases

@@ -32,12 +32,12 @@ __all__ = ["BLOCK_FRAMES", "FrameBlock", "Layout", "Simulation", "block_frames",
 BLOCK_FRAMES = 256
 """Most frames per block."""
 
-PAIR_FRAMES = 1 << 23
-"""Most pairs times frames of a block: results are 20 bytes each, 160 MiB."""
+PAIR_FRAMES = 1 << 21
+"""Most pairs times frames of a block: results are 20 bytes each, 40 MiB, and up to four blocks are held."""
 
 
 def block_frames(pairs: int) -> int:
-    """Return how many frames the blocks of a scene have; recorded, because warm-start state resets at block starts."""
+    """Return how many frames the blocks of a scene have; recorded."""
     return max(1, min(BLOCK_FRAMES, PAIR_FRAMES // max(pairs, 1)))
 
 

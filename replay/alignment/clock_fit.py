@@ -195,11 +195,26 @@ def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: flo
             break
         drift = best.drift + (float(step[1]) if drifts else 0.0)
         tried = fit_at(traces, best.offset + float(step[0]), drift, best.reference, drifts=drifts)
-        if tried.gain * best.samples < (best.gain - 0.1) * tried.samples:  # one more or less at an end does not count
+        if _is_worse(tried, best):
             step = 0.5 * step
         else:
             best, step = tried, tried.step
     return best
+
+
+def _is_worse(tried: ClockFit, best: ClockFit) -> bool:
+    """Return whether a clock fits worse than another, by the samples that both use: at the ends, these come and go."""
+    known = {signal.trace.name: signal for signal in best.signals}
+    loss, common = 0.0, 0
+    for signal in tried.signals:
+        other = known.get(signal.trace.name)
+        if other is not None:
+            both = signal.used & other.used
+            mine, theirs = (float((one.residual[both[one.used]] ** 2).sum()) for one in (signal, other))
+            common += int(both.sum())
+            exact = len(signal.measured) * _EXACT**2
+            loss += 0.5 * int(both.sum()) * float(np.log(max(mine, exact) / max(theirs, exact)))
+    return loss > 0.1 or not common
 
 
 def moved(traces: Sequence[Trace], fit: ClockFit, reference: float, *, drifts: bool) -> ClockFit:

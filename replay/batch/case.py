@@ -11,18 +11,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay.errors import NoSpaceError, ReplayError, ScenarioError, UndeterminedClockError, count
-from replay.recording.record import Progress, RecordedPaths
-from replay.scenario.expectation_check import ExpectationCheck, Outcome
-from replay.scenario.guard_outcomes import lines
+from replay.recording.recorded_paths import RecordedPaths
 from replay.scenario.measures import Measure, Measures
-from replay.scenario.unseen import Unseen
+from replay.scenario.outcome import Outcome
 
 if TYPE_CHECKING:
     from replay.batch.written import WrittenMeasure, WrittenResult
     from replay.guarding.outcome import GuardOutcomes
+    from replay.recording.record import Progress
+    from replay.scenario.expectation_check import ExpectationCheck
     from replay.scenario.first_frame import FirstFrame
     from replay.scenario.methods import Model
     from replay.scenario.model import Scenario
+    from replay.scenario.unseen import Unseen
     from replay.simulation import FrameBlock
 
 
@@ -150,7 +151,9 @@ def run_case(order: CaseOrder, progress: Progress) -> CaseResult:
     """Run one scenario into its folder and return what became of it; recordings that exist are replaced."""
     from replay.recording.record import record_blocks
     from replay.scenario.first_frame import FirstFrame
+    from replay.scenario.guard_outcomes import lines
     from replay.scenario.scene import build
+    from replay.scenario.unseen import Unseen
     from replay.simulation import Simulation
 
     begin = time.perf_counter()

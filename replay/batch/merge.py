@@ -24,7 +24,7 @@ from replay.comparison.run_folder import RUN
 from replay.errors import InvalidValue
 from replay.json_text import read_json_file, typed
 from replay.logs.part_file import write_error
-from replay.recording.record import RecordedPaths
+from replay.recording.recorded_paths import RecordedPaths
 
 
 class _Scenario(TypedDict):

@@ -11,7 +11,7 @@ from replay.errors import RecordingError
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import code_identity, library_versions
 from replay.recording.reader import read_files, read_provenance
-from replay.recording.record import RecordedPaths
+from replay.recording.recorded_paths import RecordedPaths
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 

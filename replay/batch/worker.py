@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import gc
 import os
 import pickle
 import queue
@@ -118,6 +119,8 @@ class Messages:
 
 def main() -> None:
     """Work until the pool closes the connection; it does so too when it dies."""
+    often, *others = gc.get_threshold()
+    gc.set_threshold(100 * often, *others)  # what is loaded here stays: looking for garbage among it finds none
     orders, answers = _channels()
     faulthandler.enable()
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -136,6 +139,8 @@ def main() -> None:
             start.prepare(Messages(answer))
         except Exception as error:  # a task that has the same trouble will say so itself
             answer(Told(f"a worker could not prepare itself: {error!r}"))
+    gc.freeze()
+    gc.set_threshold(often, *others)
     answer(Ready())
     while True:
         order: Order = inbox.get()

@@ -23,12 +23,13 @@ from replay.collision.columns import MARGIN, Between, CollisionColumns, Collisio
 from replay.collision.counters import Counters
 from replay.collision.engines import Engine, NarrowPhase, engine_of
 from replay.collision.intervals import Course, Intervals, Known
+from replay.collision.pair_frames import PairFrames
 from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
-from replay.numerics.arrays import Bytes, Flags, Floats, Integers
+from replay.numerics.arrays import Floats, Integers
 
 FEW_PAIRS = 512
 """Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
@@ -182,13 +183,15 @@ class CollisionPipeline:
             columns = replace(columns, between=between, clearance_bound=bound)
         crossings = []
         for found in self._evaluate(poses, lead, course):
-            columns.level[:, found.columns] = found.level
-            columns.clearance[:, found.columns] = found.clearance
-            columns.evaluated[:, found.columns] = ~np.isnan(found.clearance)
-            columns.undecided[:, found.columns] = found.undecided
+            if found.frames is not None:
+                columns.level[:, found.columns] = found.frames.level
+                columns.clearance[:, found.columns] = found.frames.clearance
+                columns.evaluated[:, found.columns] = ~np.isnan(found.frames.clearance)
+                columns.undecided[:, found.columns] = found.frames.undecided
             if course is not None and found.known is not None:
                 known = slice(course.begin - shape[0], None)  # of those that cannot move there is one row
-                between[course.begin :, found.columns] = found.known.between[known]
+                if found.frames is not None:
+                    between[course.begin :, found.columns] = found.known.between[known]
                 bound[course.begin :, found.columns] = found.known.bound[known]
                 crossings.append(found.known.crossings.of(found.columns))
         return replace(columns, crossings=Crossings.joined(crossings))
@@ -206,14 +209,16 @@ class CollisionPipeline:
         level, clearance = [np.zeros(0, dtype=np.uint8)], [np.zeros(0)]
         undecided = [np.zeros(0, dtype=bool)]
         for found in self._evaluate(poses, 0, None):
-            near = np.broadcast_to((found.level > 0) | ~np.isnan(found.clearance), (n, found.level.shape[1]))
-            f, p = np.nonzero(near)
-            source = np.minimum(f, len(found.level) - 1)
+            if found.frames is None:
+                continue
+            told, asked = found.frames, (n, len(found.columns))
+            f, p = np.nonzero(np.broadcast_to((told.level > 0) | ~np.isnan(told.clearance), asked))
+            source = np.minimum(f, len(told.level) - 1)
             frame.append(f)
-            bodies.append(self._used[found.rows[p]])
-            level.append(found.level[source, p])
-            clearance.append(found.clearance[source, p])
-            undecided.append(found.undecided[source, p])
+            bodies.append(self._used[told.pairs[p, :2]])
+            level.append(told.level[source, p])
+            clearance.append(told.clearance[source, p])
+            undecided.append(told.undecided[source, p])
         frames, pairs = np.concatenate(frame), np.concatenate(bodies)
         order = np.lexsort((pairs[:, 1], pairs[:, 0], frames))
         return CollisionEntries(
@@ -263,7 +268,7 @@ class CollisionPipeline:
         rows, columns, ways, n = batch.rows, batch.columns, batch.ways, len(poses.local)
         if course is None or self._intervals is None:
             frames = self._frames.decide(self.narrow_phase, batch, rows, poses)
-            yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, None)
+            yield _Found(columns, frames, None)
             return
         if self._savings:
             middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
@@ -272,7 +277,7 @@ class CollisionPipeline:
             if self._own is not None:  # what the other engine says of them at the frames is not known
                 near, quiet = near | quiet, np.zeros_like(quiet)
             self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
-            yield self._clear(columns[quiet], rows[quiet], self._intervals.quiet(rows[quiet], ways[quiet], course))
+            yield self._clear(columns[quiet], self._intervals.quiet(rows[quiet], ways[quiet], course))
             columns, rows, ways = columns[near], rows[near], ways[near]
         shown, first = poses.slice(lead, n), poses.slice(0, 1)
         frames = self._frames.decide(self.narrow_phase, batch, rows, shown, ways, course)
@@ -283,19 +288,12 @@ class CollisionPipeline:
             if head is not None:
                 before = head._replace(clearance=self._frames.decide(self._own, batch, rows, first).clearance)
         known = self._intervals.answer(told, before, ways, course)
-        yield _Found(columns, rows[:, :2], frames.level, frames.clearance, frames.undecided, known)
+        yield _Found(columns, frames, known)
 
-    def _clear(self, columns: Integers, rows: Integers, bound: Floats) -> _Found:
+    def _clear(self, columns: Integers, bound: Floats) -> _Found:
         """Return what is found of pairs that are clear in all of a block, with bounds (m, c) of its intervals."""
-        shape = 1, len(columns)
-        return _Found(
-            columns,
-            rows[:, :2],
-            np.zeros(shape, dtype=np.uint8),
-            np.full(shape, np.nan),
-            np.zeros(shape, dtype=bool),
-            Known(np.full(shape, Between.CLEAR, dtype=np.uint8), bound, Crossings.none()),
-        )
+        between = np.full((1, len(columns)), Between.CLEAR, dtype=np.uint8)
+        return _Found(columns, None, Known(between, bound, Crossings.none()))
 
     def _batches(self, chosen: Selected) -> list[Batch]:
         rows = self._place[chosen.rows]
@@ -306,11 +304,12 @@ class CollisionPipeline:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Results of a batch's pairs: (n, c) arrays, or (1, c) for pairs that cannot move; `rows` are their bodies."""
+    """Results of a batch's c pairs, which are these columns.
+
+    `frames` holds them in all frames, in one of pairs that cannot move; it is None if they are clear in all of them,
+    without clearances, and in all intervals.
+    """
 
     columns: Integers
-    rows: Integers
-    level: Bytes
-    clearance: Floats
-    undecided: Flags
+    frames: PairFrames | None
     known: Known | None

@@ -89,13 +89,15 @@ def fill_ways(
         for f in range(frames - 1):
             ways[row, f] = 0.0
             rounding[row, f] = 0.0
+        rests = True  # as seen from where it is so far: then one frame is as all are
         while link >= 0:
             points = centers[row]
             row -= 1
-            turns = line.kind[link] != PRISMATIC and line.joint[link] >= 0
             for f in range(frames - 1):
                 below, arm = ways[row + 1, f], 1.0
-                if turns:
+                moves = travel[link, f, 0] > 0.0 or travel[link, f, 1] > 0.0
+                rests = rests and not moves
+                if moves and line.kind[link] != PRISMATIC:
                     arm = _distance(line, link, points[f]) + radius + below
                 moved = travel[link, f, 0] * arm
                 if line.kind[link] == FREE:
@@ -104,7 +106,12 @@ def fill_ways(
             place = line.place[link]
             step = abs(place[0, 3]) + abs(place[1, 3]) + abs(place[2, 3])
             for f in range(frames):  # the steps are added up until they are all there
-                centers[row, f, 3] = points[f, 3] + step + _to_parent(local[f, link], points[f], centers[row, f])
+                if rests and f > 0:
+                    for i in range(4):
+                        centers[row, f, i] = centers[row, 0, i]
+                else:
+                    centers[row, f, 3] = points[f, 3] + step + _to_parent(local[f, link], points[f], centers[row, f])
+            for f in range(frames):
                 points[f, 3] *= POSE_ROUNDING
             for f in range(frames - 1):
                 rounding[row, f] = POSE_ROUNDING * (max(centers[row, f, 3], centers[row, f + 1, 3]) + ways[row, f])

@@ -13,7 +13,7 @@ import numpy as np
 
 from replay import limits
 from replay.errors import MeshError
-from replay.geometry import glb_file, obj_file, ply_file, stl_check
+from replay.geometry import stl_check
 from replay.lfs_pointer import LFS_POINTER, is_lfs_pointer
 from replay.numerics.arrays import Floats, Integers
 
@@ -65,8 +65,12 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
         raise MeshError(name, "is UTF-16 text; save it as UTF-8")
     try:
         if ending == ".obj":
+            from replay.geometry import obj_file
+
             return obj_file.read(data)
         if ending == ".ply":
+            from replay.geometry import ply_file
+
             return ply_file.read(data)
         announced = 0
         if ending == ".stl":
@@ -74,6 +78,8 @@ def read_faces(path: Path | str, data: bytes | None = None) -> tuple[Floats, Int
             if stl_check.is_binary(data):
                 return stl_check.triangles(data)
         else:
+            from replay.geometry import glb_file
+
             data = glb_file.bare(data)
     except ValueError as error:
         raise MeshError(name, f"is not a usable {ending[1:].upper()} file: {error}") from None

@@ -216,12 +216,16 @@ def link_travel(line: Timeline, seconds: Floats, travel: Floats) -> None:
     """
     work, found = np.empty((HALVINGS + 8, 8)), np.empty(4)
     for link in range(len(line.kind)):
+        joint = line.joint[link]
+        moves = joint >= 0
+        if moves and line.kind[link] != FREE:
+            moves = line.piece_first[joint] < line.piece_first[joint + 1]
         for f in range(len(seconds) - 1):
             travel[link, f, 0], travel[link, f, 1] = 0.0, 0.0
-            if line.joint[link] < 0:
+            if not moves:
                 continue
             if line.kind[link] == FREE:
-                free_travel(line, line.joint[link], seconds[f], seconds[f + 1], travel[link, f])
+                free_travel(line, joint, seconds[f], seconds[f + 1], travel[link, f])
             else:
-                joint_travel(line, line.joint[link], seconds[f], seconds[f + 1], work, found)
+                joint_travel(line, joint, seconds[f], seconds[f + 1], work, found)
                 travel[link, f, 0] = found[TRAVEL]

@@ -20,16 +20,25 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from replay.language.descriptions import described
 from replay.language.node import KeyPath
 from replay.language.units import Angle, Length, Number, Size
 from replay.numerics import transforms
 from replay.numerics.arrays import Floats
 
 
+def _describe(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Put the description of each key into a model's JSON schema."""
+    for key, field in model.model_fields.items():
+        text = described(model, key)
+        if text:
+            schema["properties"][field.alias or key].setdefault("description", text)
+
+
 class Part(BaseModel):
     """A mapping of the language: unknown keys are errors, and nothing changes after validation."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, hide_input_in_errors=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, json_schema_extra=_describe)
 
 
 def with_keys(base: type[Part], **keys: tuple[Any, Any]) -> Any:

@@ -42,8 +42,8 @@ class LongNumbers(CsvNumbers):
                 quotes or another number of cells.
         """
         head = CsvTable(name, data[: data.rfind(b"\n", 0, _HEAD) + 1], format)
-        super().__init__(name, head, format, needed, max_gap, readings=True)
         self._data = data
+        super().__init__(name, head, format, needed, max_gap, readings=True)
         columns = [head.headings.index(heading) for heading in sorted(self.headings - {head.time})]
         if len(data) > limits.LONG_LOG:
             raise RecordingError(name, f"has {len(data)} bytes; at most {limits.LONG_LOG} of a CSV are read")
@@ -67,8 +67,8 @@ class LongNumbers(CsvNumbers):
 
     def series(self, column: int, heading: str) -> Series | None:
         """Return the samples of a column, once; columns without empty cells share their times."""
-        values = self._values.pop(column)[: len(self._time)]
-        there = self._there.pop(column)[: len(self._time)]
+        count = len(self._time)
+        values, there = self._values.pop(column)[:count], self._there.pop(column)[:count]
         there[: self.skip] = False
         if there.all():
             time, row = self._time, np.arange(len(values))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from replay.errors import RecordingExistsError
 from replay.logs.part_file import write_error
 from replay.recording.behind import WriteBehind, Writer
 from replay.recording.provenance import describe
+from replay.recording.recorded_paths import RecordedPaths
 from replay.recording.scene_view import view
 from replay.recording.writer import McapWriter
 from replay.simulation import FrameBlock, Simulation
@@ -22,14 +22,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 """Called with the number of frames computed and the number of all frames."""
-
-
-@dataclass(frozen=True)
-class RecordedPaths:
-    """Where the recordings of a run are; `rrd` is None when none was asked for."""
-
-    mcap: Path
-    rrd: Path | None
 
 
 def record(

@@ -7,6 +7,7 @@ All of that is applied. What COLLADA is: Khronos, COLLADA 1.4.1, sections 5 (ass
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import numpy as np
 from replay import limits
 from replay.errors import MissingPackageError, RobotError
 from replay.numerics.arrays import Floats
+from replay.robots.dae_text import asset, check_primitive, corners_of
 from replay.robots.xml_text import check
 
 _INSTALL = "get it with: pip install 'replay-mechanics[robots]'"
@@ -68,9 +70,9 @@ def read(path: Path, data: bytes, *, turned: bool = True) -> Collada:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             ignored = [DaeUnsupportedError, DaeBrokenRefError]
+            data = re.sub(rb"(</?)convex_mesh\b", rb"\1mesh", data)  # pycollada passes over it; it holds the same
             file = collada.Collada(io.BytesIO(data), ignore=ignored)
-            unit = 1.0 if file.assetInfo.unitmeter is None else float(file.assetInfo.unitmeter)
-            up = str(file.assetInfo.upaxis or "Y_UP")
+            unit, up = asset(file.xmlnode.getroot())
             parts = list(_parts(file, path))
     except RobotError:
         raise
@@ -78,9 +80,9 @@ def read(path: Path, data: bytes, *, turned: bool = True) -> Collada:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise RobotError(str(path), f"is not a usable COLLADA file: {reason}") from None
     if not parts:
-        raise RobotError(str(path), "holds no triangles")
-    if up not in _UP or not 1e-9 <= unit <= 1e9:
-        raise RobotError(str(path), f"has a unit of {unit:g} m and {up[:20]!r}, which cannot be used")
+        raise RobotError(str(path), "holds no triangles in its scene")
+    if not 1e-9 <= unit <= 1e9:
+        raise RobotError(str(path), f"has a unit of {unit:g} m, which cannot be used")
     triangles = np.concatenate(parts)
     if not np.isfinite(triangles).all():
         raise RobotError(str(path), "has corners that are not finite")
@@ -144,20 +146,25 @@ def _geometries(node: Any, file: Any) -> list[Any]:
             name = element.get("url", "").removeprefix("#")
             if name not in file.geometries:
                 raise ValueError(f"a node has the geometry {name[:60]!r}, which is not there or cannot be used")
+            if any(mesh.get("convex_hull_of") for mesh in file.geometries[name].xmlnode):
+                raise ValueError(f"the geometry {name[:60]!r} is the hull of another, which is not read")
             found.append(file.geometries[name])
     return found
 
 
 def _corners(primitive: Any) -> Floats:
     """Return the triangles (n, 3, 3) of a set of triangles or polygons; none of lines."""
+    if hasattr(primitive, "vertex_index"):
+        check_primitive(primitive)
     if hasattr(primitive, "triangleset"):
         primitive = primitive.triangleset()
     if type(primitive).__name__ != "TriangleSet" or not len(primitive):
         return np.zeros((0, 3, 3))
-    vertices = np.asarray(primitive.vertex, dtype=np.float64)
+    vertices = corners_of(primitive)
     index = np.asarray(primitive.vertex_index, dtype=np.int64).reshape(-1, 3)
     if len(index) and not 0 <= index.min() <= index.max() < len(vertices):
-        raise ValueError(f"a triangle refers to vertex {index.max()} of {len(vertices)}")
+        wrong = index.min() if index.min() < 0 else index.max()
+        raise ValueError(f"a triangle refers to vertex {wrong} of {len(vertices)}")
     return vertices[index]
 
 

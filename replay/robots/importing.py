@@ -184,6 +184,8 @@ def _pose(text: str) -> Origin:
         result = quantity_rule(word if word[-1].isalpha() else f"{word} {dimension.si}", (dimension,))
         if isinstance(result, str):
             raise RobotError("--root-pose", f"{word!r} {result}")
+        if abs(result[0]) > 10**12:
+            raise RobotError("--root-pose", f"{word!r} must be between -1e12 and 1e12 {dimension.si}")
         values.append(float(result[0]))
     x, y, z, *turns = values
     roll, pitch, yaw = turns or (0.0, 0.0, 0.0)

@@ -70,7 +70,12 @@ class Packages:
             raise element.wrong(f"{written[:200]!r} is a URL; only package:// and files are read")
         path = self._folder / text.removeprefix("file://")
         tree = (self._tree, *self._given.values(), *self._search_path)
-        return Found(self._existing(path, tree, written, element))
+        steps = PurePosixPath(text).parts
+        namesake = next((folder for folder in self._above if len(steps) > 1 and folder.name == steps[0]), None)
+        if namesake is None or ".." in steps or path.is_file() or not namesake.joinpath(*steps[1:]).is_file():
+            return Found(self._existing(path, tree, written, element))
+        found = self._existing(namesake.joinpath(*steps[1:]), (self._tree,), written, element)  # of many robots' folder
+        return Found(found, f"{steps[0]}/ is taken to be {namesake}")
 
     @cached_property
     def _above(self) -> tuple[Path, ...]:

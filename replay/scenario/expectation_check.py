@@ -14,37 +14,18 @@ from replay.collision.columns import CollisionColumns, Level
 from replay.guarding.outcome import Stop
 from replay.guarding.part import GuardExpectation
 from replay.language.fields import Part
-from replay.language.node import KeyPath, Place
+from replay.language.node import KeyPath
 from replay.numerics.arrays import Floats, Integers
 from replay.scenario.expectations import BetweenPart, PairExpectation
 from replay.scenario.guard_outcomes import judge
 from replay.scenario.layout import Layout
-from replay.scenario.measures import Measure
 from replay.scenario.meetings import Clearances, Meetings, Seen, seen
 from replay.scenario.names import matches
+from replay.scenario.outcome import Outcome
 from replay.scenario.source import ScenarioProvenance, dotted
 from replay.scenario.tallies import Count, Extremes, Tally
 from replay.sensing.kind import Expected
 from replay.sensing.kinds import KINDS
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one line of an expectation.
-
-    Attributes:
-        expectation: as people read it: `detector* | patient*: contact never`.
-        place: where it is written; None when the scenario was not read from text.
-        passed: whether it held.
-        detail: the values and times that decided.
-        measure: the number that decided; None of an earlier run that did not tell it.
-    """
-
-    expectation: str
-    place: Place | None
-    passed: bool
-    detail: str
-    measure: Measure | None = None
 
 
 @dataclass(frozen=True)

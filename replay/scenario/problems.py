@@ -15,6 +15,7 @@ from replay import limits
 from replay.errors import Problem
 from replay.guarding.part import CONDITIONS, condition_key
 from replay.language import decimal_comma
+from replay.language.descriptions import described
 from replay.language.fields import NAME_RULE, TITLE_RULE, Name, Title
 from replay.language.node import KeyPath, Node
 from replay.scenario.expectations import PARTS
@@ -142,8 +143,7 @@ def _missing(found: _Location, last: str | int, root: Node) -> Problem:
         node = find(root, path)
         count = len(node.sequence) if node is not None else 0
         return locate(root, path).problem(f"{dotted(path)} needs {found.length} entries, not {count}")
-    fields = {} if found.owner is None else found.owner.model_fields
-    about = fields[last].description if last in fields else None
+    about = None if found.owner is None else described(found.owner, last)
     hint = f"; {' '.join(about.split()).rstrip('.')}" if about else ""
     return locate(root, path).problem(f"{dotted((*path, last))} is missing{hint}")
 

@@ -44,9 +44,8 @@ def test_intervals_hold_the_truth_in_a_sample_of_logs():
 @pytest.mark.soak
 def test_intervals_hold_the_truth_in_a_thousand_logs():
     names = sorted(path.name for path in BASELINES.iterdir() if (path / f"{path.name}.mcap").exists())
-    held, refused = tally(1000, names, seed=2)
-    assert all(0.93 <= held[name] <= 0.97 for name in ("offset", "drift")), held
-    assert all(0.93 <= held[name] <= 0.98 for name in ("scale", "bias")), held
+    held, refused = tally(1000, names, seed=101)
+    assert all(0.93 <= share <= 0.97 for share in held.values()), held
     assert refused < 0.15
 
 

@@ -190,17 +190,17 @@ def root(a, b, low, high):
     """The moment between two at which the gap of two bodies changes its sign, in 50 digits, and the slope [m/s]."""
     with mpmath.workdps(DIGITS):
         before = gap(a, b, np.array([low]))[0][0]
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            apart = gap(a, b, np.array([middle]))[0][0]
-            low, high = (middle, high) if (apart > 0.0) == (before > 0.0) else (low, middle)
+        for _ in range(20):  # until the two are neighbours
+            inner = np.unique(np.linspace(low, high, 34))
+            k = 1 + int(((gap(a, b, inner)[0][1:] > 0.0) != (before > 0.0)).argmax())
+            low, high = inner[k - 1], inner[k]
         feature = gap(a, b, np.array([high if before > 0.0 else low]))[1]
         width = mpmath.mpf(max(high - low, 2e-16 * abs(high)))
         x, y = mpmath.mpf(low), mpmath.mpf(high) + width
         f, g = gap_along(a, b, feature, x), gap_along(a, b, feature, y)
         slope = (g - f) / (y - x)
         for _ in range(20):
-            if f == g or abs(y - x) <= mpmath.mpf(10) ** -35 * width:
+            if f == g or abs(y - x) <= mpmath.mpf(10) ** -25 * width:
                 break
             x, y, f = y, y - g * (y - x) / (g - f), g
             g = gap_along(a, b, feature, y)

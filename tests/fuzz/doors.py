@@ -27,7 +27,7 @@ from replay.logs.curve_csv import read_curve
 from replay.logs.mcap_reader import McapLog
 from replay.recording.provenance import RECORD, Provenance
 from replay.recording.reader import read
-from replay.recording.record import RecordedPaths
+from replay.recording.recorded_paths import RecordedPaths
 from replay.scenario.load import load_cases, load_model, load_sources
 from tests.fuzz import damage
 from tests.fuzz.compare_doors import CompareDoors

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+from replay.language.descriptions import described
 from replay.language.fields import Axis, Name, Part, Placement, Quaternion, in_order, needs_one
 from replay.numerics import transforms
 
@@ -23,7 +24,8 @@ def test_a_part_refuses_unknown_keys_and_changes_and_describes_its_keys():
         Bounds(least=1.0)
     with pytest.raises(ValidationError, match="frozen"):
         Bounds(min=1.0).min = 2.0
-    assert Bounds.model_fields["min"].description == "The least one."
+    assert described(Bounds, "min") == "The least one." and described(Bounds, "max") is None
+    assert Bounds.model_json_schema()["properties"]["min"]["description"] == "The least one."
     with pytest.raises(ValidationError) as caught:
         Bounds(min="secret")
     assert "secret" not in str(caught.value)

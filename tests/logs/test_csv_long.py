@@ -57,6 +57,7 @@ REFUSED = {
     PLAIN.replace("\n40.05", "\n\n4o.05"): "line 43, column 'time': '4o.05' is not a finite number",
     PLAIN.replace("30.05,3.0", '30.05,"3.0"'): "column 'a': '\"3.0\"' is not a finite number",
     PLAIN.replace("\n30.05", "\n# here it stopped\n30.05"): "no plain table, of which alone more than 10000000 cells",
+    PLAIN.replace("0.05,", "o.05,", 1): "line 2, column 'time': 'o.05' is not a finite number",
     PLAIN.replace("30.05,3.0", "30.05,1e400"): "'1e400' is not a finite number",
     PLAIN.replace("30.05,3.0", "30.05,nan(1)"): "'nan(1)' is not a finite number",
     PLAIN.replace("\n30.05", "\n" + "9" * 30 + ",1,1,1\n30.05"): "is beyond 146 years",

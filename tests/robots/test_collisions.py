@@ -14,7 +14,8 @@ from replay.scenario.load import load_sources
 from replay.scenario.scene import build
 from replay.simulation import touching
 from tests.robots import made
-from tests.robots.test_poses import descriptions, imported
+from tests.robots.public import descriptions
+from tests.robots.test_poses import imported
 
 PANDA = Path(replay.__file__).parents[1] / "scenarios" / "parts" / "panda.yaml"
 NEAR = 1e-6
@@ -127,7 +128,7 @@ def scene_of(description, folder):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("engine", ENGINES, ids=["fcl", "coal"])
-@pytest.mark.parametrize("description", descriptions(), ids=lambda path: path.name)
+@pytest.mark.parametrize("description", descriptions(), ids=lambda path: "/".join(path.parts[-3:]))
 def test_public_robots_touch_themselves_where_others_say_so(description, engine, tmp_path):
     """Of robots of at most 40 bodies; one that is refused is compared in `test_poses.py`."""
     try:

@@ -112,6 +112,64 @@ def test_files_that_cannot_be_used_are_refused(data, rule, tmp_path):
     assert rule in str(caught.value) and "\n" not in str(caught.value)
 
 
+BASE = dae()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        *(
+            (b"1000 0 0 0", word + b" 0 0 0", "has corners that are not finite")
+            for word in (b"NaN", b"nan", b"-nan(ind)")
+        ),
+        (b"1000 0 0 0", b"1e39 0 0 0", "has corners that are not finite"),
+        (b"1000 0 0 0", b"1,5 0 0 0", "Corrupted float array"),
+        (b"0 2 1 0 1 3", b"0 2 1 0 x 3", "Corrupted index"),
+        (b"0 2 1 0 1 3", b"0 4294967298 1 0 1 3", "a triangle refers to vertex 4294967298..., which cannot be"),
+        (b"0 2 1 0 1 3", b"0 -2 1 0 1 3", "a triangle refers to vertex -2 of 4"),
+        (b"0 3 2 1 2 3", b"0 3 2", "<triangles> has count='4', of which 3 are there"),
+        (b'stride="3"', b'stride="4"', "its corners have stride='4' and offset='0'; 3 and 0 are read"),
+        (b'stride="3"', b'stride="3" offset="3"', "offset='3'"),
+        (b'meter="1"', b'meter="1 cm"', "its unit has meter='1 cm', which is no number"),
+        (b"Z_UP", b"W_UP", "its <up_axis> is 'W_UP'; there are X_UP, Y_UP, Z_UP"),
+    ],
+)
+def test_what_pycollada_would_read_as_something_else_is_refused(old, new, rule, tmp_path):
+    assert BASE.count(old) == 1
+    with pytest.raises(RobotError, match=r"x\.dae") as caught:
+        dae_file.read(tmp_path / "x.dae", BASE.replace(old, new))
+    assert rule in str(caught.value)
+
+
+def test_polygons_that_are_not_all_there_and_holes_in_them_are_refused(tmp_path):
+    whole = "<p>0 1 2 3</p>"
+    polygons = '<polygons count="2"><input semantic="VERTEX" source="#v" offset="0"/>{}</polygons>'
+    assert len(read(tmp_path, faces=polygons.format(whole)).triangles) == 2
+    with pytest.raises(RobotError, match=r"a polygon has a hole \(<ph>\), which is not read"):
+        read(tmp_path, faces=polygons.format(f"{whole}<ph>{whole}<h>0 1 2</h></ph>"))
+    with pytest.raises(RobotError, match="<polylist> has count='4', of which 2 are there"):
+        read(tmp_path, faces=POLYGONS.replace("3 3 3 3", "3 3"))
+
+
+def test_corners_that_are_no_numbers_and_that_no_triangle_has_do_no_harm(tmp_path):
+    more = BASE.replace(b"0 0 3000<", b"0 0 3000 NaN nan 1<").replace(b'count="4" stride', b'count="5" stride')
+    np.testing.assert_array_equal(dae_file.read(tmp_path / "x.dae", more).triangles, read(tmp_path).triangles)
+
+
+def test_convex_meshes_are_meshes_and_hulls_of_others_are_refused(tmp_path):
+    convex = BASE.replace(b"mesh>", b"convex_mesh>")
+    np.testing.assert_array_equal(dae_file.read(tmp_path / "x.dae", convex).triangles, read(tmp_path).triangles)
+    hull = b'<geometry id="h"><convex_mesh convex_hull_of="#g"/></geometry></library_geometries>'
+    placed = b'<instance_geometry url="#g"/><instance_geometry url="#h"/>'
+    more = BASE.replace(b"</library_geometries>", hull).replace(PLACED.encode(), placed)
+    with pytest.raises(RobotError, match="the geometry 'h' is the hull of another, which is not read"):
+        dae_file.read(tmp_path / "x.dae", more)
+
+
+def test_blanks_around_the_axis_that_points_up_do_no_harm(tmp_path):
+    assert dae_file.read(tmp_path / "x.dae", BASE.replace(b">Z_UP<", b">\n Z_UP <")).up == "Z_UP"
+
+
 def test_an_import_writes_them_as_stl_beside_the_part(tmp_path):
     (tmp_path / "x.dae").write_bytes(dae(unit=0.001))
     (tmp_path / "r.urdf").write_text(made.robot(made.link("a", '<mesh filename="x.dae" scale="2 2 2"/>')))

@@ -91,6 +91,19 @@ def test_a_tree_that_was_moved_in_part_is_told(written, mesh, taken, tmp_path):
     assert here.path == path and here.assumed.endswith(taken.format(tmp_path))
 
 
+def test_a_path_from_the_folder_of_many_robots_on_is_found_and_told(tmp_path):
+    mesh = put(tmp_path / "all" / "robot" / "meshes" / "a.stl")
+    here = tmp_path / "all" / "robot" / "urdf"
+    here.mkdir()
+    told = found(here, "robot/meshes/a.stl")
+    assert (told.path, told.assumed) == (mesh, f"robot/ is taken to be {tmp_path / 'all' / 'robot'}")
+    nearer = put(here / "robot" / "meshes" / "a.stl")
+    assert found(here, "robot/meshes/a.stl").path == nearer and not found(here, "robot/meshes/a.stl").assumed
+    for written in ("robot/meshes/b.stl", "other/meshes/a.stl"):
+        with pytest.raises(RobotError, match="is not to be found; looked for "):
+            found(here, written)
+
+
 def test_a_folder_that_is_there_twice_is_no_package(tmp_path):
     for kind in "xy":
         put(tmp_path / "robot" / "meshes" / kind / "collision" / "a.stl")

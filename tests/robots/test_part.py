@@ -120,7 +120,7 @@ def test_the_root_stands_where_it_is_told_to(tmp_path):
     imported(tmp_path, made.link("a"), root_pose="1 0 90cm 0, 0, 90deg")
     pose = loaded(tmp_path).links["a"].pose
     assert (pose.xyz, pose.rpy) == ((1.0, 0.0, 0.9), (0.0, 0.0, np.pi / 2))
-    for wrong in ("1 2", "1 2 3 4 5 6 7", "1 2 30deg", "a b c"):
+    for wrong in ("1 2", "1 2 3 4 5 6 7", "1 2 30deg", "a b c", "0 0 0 0 0 1e999"):
         with pytest.raises(RobotError, match="--root-pose"):
             imported(tmp_path, made.link("a"), root_pose=wrong)
 

@@ -1,8 +1,6 @@
 """Where the links of an imported robot are, against an independent reader and, where it is installed, pinocchio."""
 
-import importlib.metadata
 import importlib.util
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +10,11 @@ from replay.robots import checking
 from replay.robots.importing import Options, run
 from replay.scenario.script import linkage
 from tests.robots import made
+from tests.robots.public import descriptions, semantics
 from tests.robots.reader import Reader, disabled
 
 BOUND = 1e-12
 """Of the reach of the robot; 170 robots of public packages are within 3e-15."""
-
-PACKAGES = ("example-robot-data", "airo-models", "pybullet", "rtb-data")
-"""From PyPI, none of them needed: those that are installed are read by the long version."""
 
 
 def imported(description, folder, **options):
@@ -64,31 +60,20 @@ def test_a_chain_of_joints_that_follow_adds_up(tmp_path):
     np.testing.assert_allclose(machine.followed(np.array([[0.4, 0.0, 0.0]])), [[0.4, 0.4, 0.9]], rtol=1e-15)
 
 
-def descriptions():
-    found = []
-    for package in PACKAGES:
-        try:
-            files = importlib.metadata.distribution(package).files or []
-        except importlib.metadata.PackageNotFoundError:
-            continue
-        found += [Path(file.locate()) for file in files if file.suffix == ".urdf" and "random_urdfs" not in file.parts]
-    return sorted(found)
-
-
 @pytest.mark.soak
-@pytest.mark.parametrize("description", descriptions(), ids=lambda path: path.name)
+@pytest.mark.parametrize("description", descriptions(), ids=lambda path: "/".join(path.parts[-3:]))
 def test_public_robots_are_read_as_pinocchio_reads_them_or_refused(description, tmp_path):
     """Link poses, and the SRDF pairs of those that have one; a refusal names the file and says why."""
-    semantics = next(iter(sorted(description.parent.parent.glob(f"srdf/{description.stem}.srdf"))), None)
+    beside = semantics(description)
     try:
-        done, machine = imported(description, tmp_path, srdf=semantics)
+        done, machine = imported(description, tmp_path, srdf=beside)
     except RobotError as error:
         assert error.reason and "\n" not in str(error)
         return
     positions, world = poses(machine, 100)
-    if semantics is not None:
+    if beside is not None:
         bodies = {name for name, entry in done.part.links.items() if "shapes" in entry}
-        wanted = {pair for pair in disabled(semantics) if pair <= bodies}
+        wanted = {pair for pair in disabled(beside) if pair <= bodies}
         kept = {frozenset((a, b)) for a, b, reason in done.part.disabled if reason != "rigid to each other"}
         rigid = {frozenset((a, b)) for a, b, reason in done.part.disabled if reason == "rigid to each other"}
         assert kept == wanted and not rigid & wanted

@@ -43,6 +43,7 @@ try:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.options import DefaultOptions
     from numba.core.registry import CPUDispatcher, cpu_target
+    from numba.core.runtime import rtsys
 
     _NEEDED = (
         (CPUDispatcher, ("compile", "add_overload", "get_call_template", "get_overload")),
@@ -150,7 +151,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         payload = store.load(name, key)
         if payload is None:
             return None
-        self.targetctx.refresh()  # as numba does before it reads its own cache
+        rtsys.initialize(self.targetctx)  # numba does all that compiling needs, which takes half a second, before
         try:
             result = CompileResult._rebuild(self.targetctx, *pickle.loads(payload))
         except Exception:  # whole, and yet of no use: compiling it again mends it
