@@ -9,8 +9,9 @@ from pydantic import ValidationError
 
 from replay import limits
 from replay.errors import ScenarioError
+from replay.scenario import load as load_module
 from replay.scenario.load import load, load_cases, load_sources
-from replay.scenario.sweep import SweepPart
+from replay.scenario.sweep import SweepPart, cases
 
 TEXT = """version: 1
 name: eye
@@ -135,6 +136,16 @@ def test_values_are_counted_that_cases_have_and_not_those_of_the_sweep(tmp_path,
     monkeypatch.setattr(limits, "SWEEP_VALUES", 40 * each)
     assert len(load_cases(write(tmp_path, f"  grid: {{rate: {[f'{k} Hz' for k in range(1, 41)]}}}\n"))) == 40
     assert len(problems(tmp_path, f"  grid: {{rate: {[f'{k} Hz' for k in range(1, 42)]}}}\n")) == 1
+
+
+def test_the_cases_of_one_sweep_are_listed_once_however_many_are_asked_for(monkeypatch):
+    listed = []
+    monkeypatch.setattr(load_module, "cases", lambda *given: listed.append(given) or cases(*given))
+    sources = {"eye.yaml": f"# asked for here alone\n{TEXT}{GRID}".encode()}
+    for angle in (10, 30):
+        name = f"eye[aperture={angle}deg,arm=5deg]"
+        assert load_sources("eye.yaml", sources, case=name).name == name
+    assert len(listed) == 1
 
 
 def test_cases_share_their_meshes_in_memory(tmp_path):
