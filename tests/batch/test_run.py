@@ -50,7 +50,7 @@ def test_failures_are_told_apart_and_the_others_are_recorded(tmp_path, monkeypat
     scenarios.append(scenes.scene("broken", contact="always"))
     (tmp_path / "crash").mkdir()
     (tmp_path / "crash" / "crash.mcap").write_bytes(b"of last night")
-    limits = Execution(workers=2, timeout=3.0, memory=600 << 20)
+    limits = Execution(workers=2, timeout=10.0, memory=600 << 20)
     run = run_all(scenarios, tmp_path, rrd=False, overwrite=True, execution=limits)
     assert {result.name: result.status for result in run.results} == {
         "good": CaseStatus.PASSED,
@@ -63,7 +63,7 @@ def test_failures_are_told_apart_and_the_others_are_recorded(tmp_path, monkeypat
     assert (tmp_path / "crash" / "log.txt").read_text().splitlines()[:2] == ["about to crash", "crash: crashed"]
     assert not (tmp_path / "crash" / "crash.mcap").exists()
     summary = json.loads((tmp_path / "run.json").read_text())
-    assert summary["scenarios"]["hang"]["error"] == "stopped: still running after the time limit of 3 s"
+    assert summary["scenarios"]["hang"]["error"] == "stopped: still running after the time limit of 10 s"
     assert summary["scenarios"]["eat"]["memory"] > 600 << 20
     assert json.loads((tmp_path / "eat" / "result.json").read_text())["status"] == "memory"
     assert {process.pid for process in psutil.Process().children(recursive=True)} == before
