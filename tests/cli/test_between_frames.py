@@ -19,6 +19,7 @@ from replay.cli.main import run
 from replay.collision.columns import Between
 from replay.comparison.difference import DiffVerdict
 from replay.recording.record import record
+from replay.scenario.methods import METHOD_REVISIONS
 
 TUNNEL = """
 version: 1
@@ -97,7 +98,7 @@ def test_frames_alone_do_not_see_it_and_validate_warns(tmp_path: Path, capsys: p
 
 def test_the_recording_says_when(recorded: Path) -> None:
     recording = replay.read(recorded / "tunnel.mcap")
-    assert recording.provenance.model["collision.between"] == "proven@1"
+    assert recording.provenance.model["collision.between"] == f"proven@{METHOD_REVISIONS['collision.between.proven']}"
     states = [Between.NOT_LOOKED, *[Between.CLEAR] * 4, Between.CONTACT, *[Between.CLEAR] * 5]
     assert recording.collision.between[:, 0].tolist() == states
     bound = recording.collision.clearance_bound[1:, 0]
@@ -196,5 +197,5 @@ def test_runs_of_both_models_are_compared(tmp_path: Path, recorded: Path, capsys
     assert found.verdict is DiffVerdict.SAME
     told = {change.name: change.candidate for change in found.provenance}
     assert told["/collision"] == "between, clearance_bound (2 signals); 1 contact between two frames"
-    assert told["model.collision.between"] == "proven@1"
+    assert told["model.collision.between"] == f"proven@{METHOD_REVISIONS['collision.between.proven']}"
     assert replay.diff(proof, frames, rules=RULES).verdict is DiffVerdict.DIFFERENT
