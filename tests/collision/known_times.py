@@ -61,11 +61,14 @@ def _joint(name, step, names, script):
     return Joint(name, kind, step.axis)
 
 
-def contacts(scene, seconds, samples=48):
-    """Return (contacts as `Scene.contacts`, times at which the gap nearly turns into one or nearly ends [s])."""
+def contacts(scene, seconds, also, samples=48):
+    """Return (contacts as `Scene.contacts`, times at which the gap nearly turns into one or nearly ends [s]).
+
+    The gap is looked at between the frames' `seconds` and at `also`: a contact may be shorter than samples are apart.
+    """
     a, b = ((steps, convex) for steps, convex, _ in scene.bodies)
     knots = [step.path.times for steps in (a[0], b[0]) for step in steps if step.path is not None]
-    knots = np.unique(np.concatenate([seconds, *knots]).clip(seconds[0], seconds[-1]))
+    knots = np.unique(np.concatenate([seconds, also, *knots]).clip(seconds[0], seconds[-1]))
     times = np.unique(np.concatenate([np.linspace(x, y, samples) for x, y in itertools.pairwise(knots)]))
     apart = gap(a, b, times)[0]
     tiny, grazes = 1e-9 * scene.size, []
@@ -118,7 +121,8 @@ def check(seed, family):
     engine = CollisionPipeline(bodies, plan_pairs(bodies, linkage), linkage, motion=motion, **options)
     states = motion.states(time / 1e9)
     columns = engine.run(linkage.forward(states.positions, states.free_poses), time=time)
-    known, grazes = (scene.contacts, ()) if scene.contacts else contacts(scene, time / 1e9)
+    told = np.concatenate([columns.crossings.earliest, columns.crossings.latest]) / 1e9
+    known, grazes = (scene.contacts, ()) if scene.contacts else contacts(scene, time / 1e9, told)
     reach = 10.0 * size + sum(np.abs(step.place[:3, 3]).max() for steps, _, _ in scene.bodies for step in steps)
     place = (seed, family.__name__)
     crossings, seen = columns.crossings, Counter(scenes=1)
