@@ -63,6 +63,14 @@ class FieldChannel:
         self._decode = decode
         protobuf = schema is not None and self.channel.encoding == "protobuf"
         self._type = message_type(self.file, schema.name, schema.data) if schema is not None and protobuf else None
+        self._single: dict[str, FieldPath] = {}
+        self._entries: dict[FieldPath, dict[str, int]] = {}  # several entries of one list are taken together
+        for path, steps in self.paths.items():
+            *above, last = steps.steps
+            if above and isinstance(last, int):
+                self._entries.setdefault(FieldPath("", tuple(above)), {})[path] = last
+            else:
+                self._single[path] = steps
         self.values = {path: [] for path in self.paths}
         self.there = {path: [] for path in self.paths}
         self._known: tuple[MessageShape, dict[str, _Cell], tuple[Slot, Slot] | None] | None = None
@@ -107,14 +115,28 @@ class FieldChannel:
         values = {path: np.full(count, np.nan) for path in self.paths}
         there = {path: np.zeros(count, dtype=np.bool_) for path in self.paths}
         stamps = np.zeros(count, dtype=np.int64)
+        lists: dict[FieldPath, list[Any]] = {parent: [] for parent in self._entries}
         for k, data in enumerate(run.messages()):
             message = self._decoded(data)
             stamps[k] = self._stamp(message)
-            for path, steps in self.paths.items():
+            for path, steps in self._single.items():
                 found = steps.value(message)
                 if found is not ABSENT:
                     values[path][k] = self._number(path, found)
                     there[path][k] = True
+            for parent, rows in lists.items():
+                rows.append(parent.value(message))
+        for parent, rows in lists.items():
+            table = _table(rows)
+            for path, entry in self._entries[parent].items():
+                if table is not None and entry < table.shape[1]:
+                    values[path], there[path] = table[:, entry], np.ones(count, dtype=np.bool_)
+                    continue
+                for k, row in enumerate(rows):
+                    found = ABSENT if row is ABSENT else FieldPath(path, (entry,)).value(row)
+                    if found is not ABSENT:
+                        values[path][k] = self._number(path, found)
+                        there[path][k] = True
         for path in self.paths:
             self.values[path].append(values[path])
             self.there[path].append(there[path])
@@ -134,8 +156,8 @@ class FieldChannel:
         for path in _STAMPS:
             found: Any = message
             for step in path.split("."):
-                found = found.get(step) if isinstance(found, Mapping) else None
-            if isinstance(found, str | Mapping):
+                found = found.get(step) if type(found) is dict or isinstance(found, Mapping) else None
+            if found is not None and isinstance(found, str | Mapping):
                 try:
                     stamp = time_stamp(found)
                 except (ValueError, OverflowError):
@@ -225,3 +247,14 @@ def _stamp_of(shape: MessageShape) -> tuple[Slot, Slot] | None:
 
 def _joined(parts: Sequence[Any], kind: Any) -> Any:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=kind)
+
+
+def _table(rows: list[Any]) -> Floats | None:
+    """Return lists of as many plain numbers as an array (n, entries); None if they are none."""
+    if not rows or not all(type(row) is list and len(row) == len(rows[0]) for row in rows):
+        return None
+    try:
+        table = np.array(rows)
+    except (ValueError, OverflowError):
+        return None
+    return table if table.ndim == 2 and table.dtype == np.float64 else None

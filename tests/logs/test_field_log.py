@@ -59,6 +59,23 @@ def test_what_is_missing_is_no_sample_and_null_is_nothing():
     assert np.array_equal(series.value, [1.0, np.nan, np.inf, 1.0], equal_nan=True)
 
 
+@pytest.mark.parametrize(
+    "odd", [[], [1.5], [1.5, None], [1.5, "NaN", 2.5], [1, True, 2**70], [1.5, 2.5, 3.5, 4.5], None, 7.0]
+)
+def test_entries_of_a_list_are_read_alike_whatever_other_messages_hold(odd):
+    """Lists of plain numbers are taken together, others entry by entry."""
+    plain = [(10 * k, {"d": [0.5 * k, 1.5 * k, float(k)]}) for k in range(1, 5)]
+    mixed = [*plain, (50, {"d": odd}), (60, {})]
+    places = [("/a", f"d[{k}]") for k in range(4 if odd == [1.5, 2.5, 3.5, 4.5] else 3)]
+    series = fields(json_log(*mixed), *places).series
+    words = {"NaN": np.nan, None: np.nan}
+    for k, place in enumerate(places):
+        expected = [(t, body["d"][k]) for t, body in mixed if isinstance(body.get("d"), list) and k < len(body["d"])]
+        times, values = zip(*expected, strict=True)
+        np.testing.assert_array_equal(series[place].time, times)
+        np.testing.assert_array_equal(series[place].value, [float(words.get(value, value)) for value in values])
+
+
 def test_samples_are_put_in_order_and_repeated_ones_are_one():
     series = fields(json_log((30, {"d": 3}), (10, {"d": 1}), (30, {"d": 3})), ("/a", "d")).series["/a", "d"]
     assert series.time.tolist() == [10, 30]
