@@ -108,7 +108,7 @@ TEXT_LOG: Final = 256 * MIB
 LONG_LOG: Final = 512 * MIB
 """Bytes of a log in CSV that measures readings and is a plain table of numbers."""
 LONG_CELLS: Final = 40_000_000
-"""Cells of such a log in the columns that are needed, with that of the times."""
+"""Cells of such a log in the columns that are needed, and eight for each time, which is exact."""
 COLUMNS: Final = 10_000
 """Columns of a table."""
 

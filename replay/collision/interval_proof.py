@@ -31,7 +31,6 @@ BY_FRAMES, IN_DOUBT = range(COUNTS)
 CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 """As `columns.Between`."""
 
-
 FAR, QUIET, NEAR = range(3)
 """What a block may hold of a pair: the largest bound in all intervals; nothing within the limit in any frame, and all
 intervals proven by that; or more."""

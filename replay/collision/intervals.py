@@ -57,6 +57,12 @@ class Course:
         largest: Floats = self.rounding.max(axis=1, initial=0.0)
         return largest
 
+    @cached_property
+    def blur(self) -> Floats:
+        """(V,) the largest rounding of a centre in each row of `centers` [m]."""
+        largest: Floats = self.centers[:, :, 3].max(axis=1)
+        return largest
+
 
 @dataclass(frozen=True, eq=False)
 class Known:
@@ -179,7 +185,7 @@ class Intervals:
             half,
             longest,
             course.largest_rounding,
-            course.centers[:, :, 3].max(axis=1),
+            course.blur,
             self._limit,
             self._cap,
             kinds,

@@ -22,6 +22,8 @@ from replay.numerics.arrays import Flags, Floats
 _HEAD = 1 << 20
 """Bytes at the beginning that hold the headings, and numbers enough to tell how they are written."""
 _BLOCK = 4 << 20
+_TIME = 8
+"""Numbers that take as much memory as a time, which is exact."""
 
 
 def is_long(data: bytes) -> bool:
@@ -47,8 +49,9 @@ class LongNumbers(CsvNumbers):
         columns = [head.headings.index(heading) for heading in sorted(self.headings - {head.time})]
         if len(data) > limits.LONG_LOG:
             raise RecordingError(name, f"has {len(data)} bytes; at most {limits.LONG_LOG} of a CSV are read")
-        if data.count(b"\n") * (len(columns) + 1) > limits.LONG_CELLS:
+        if data.count(b"\n") * (len(columns) + _TIME) > limits.LONG_CELLS:
             rule = f"has more than {limits.LONG_CELLS} cells in the {len(columns) + 1} columns that are needed"
+            rule += f", each time counted as {_TIME}"
             raise RecordingError(name, rule)
         self._odd = 0
         self.times = []

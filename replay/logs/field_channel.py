@@ -11,7 +11,7 @@ import numpy as np
 
 from replay import limits
 from replay.errors import RecordingError
-from replay.logs.field_path import ABSENT, FieldPath
+from replay.logs.field_path import ABSENT, FieldPath, entry_of
 from replay.logs.joint_log import leading_zeros
 from replay.logs.joint_messages import time_stamp
 from replay.logs.mcap_chunks import MessageRun
@@ -64,7 +64,7 @@ class FieldChannel:
         protobuf = schema is not None and self.channel.encoding == "protobuf"
         self._type = message_type(self.file, schema.name, schema.data) if schema is not None and protobuf else None
         self._single: dict[str, FieldPath] = {}
-        self._entries: dict[FieldPath, dict[str, int]] = {}  # several entries of one list are taken together
+        self._entries: dict[FieldPath, dict[str, int]] = {}  # by list: of joints' positions, say, many are read
         for path, steps in self.paths.items():
             *above, last = steps.steps
             if above and isinstance(last, int):
@@ -115,7 +115,7 @@ class FieldChannel:
         values = {path: np.full(count, np.nan) for path in self.paths}
         there = {path: np.zeros(count, dtype=np.bool_) for path in self.paths}
         stamps = np.zeros(count, dtype=np.int64)
-        lists: dict[FieldPath, list[Any]] = {parent: [] for parent in self._entries}
+        lists = [_Entries(parent, tuple(of_it), tuple(of_it.values())) for parent, of_it in self._entries.items()]
         for k, data in enumerate(run.messages()):
             message = self._decoded(data)
             stamps[k] = self._stamp(message)
@@ -124,19 +124,18 @@ class FieldChannel:
                 if found is not ABSENT:
                     values[path][k] = self._number(path, found)
                     there[path][k] = True
-            for parent, rows in lists.items():
-                rows.append(parent.value(message))
-        for parent, rows in lists.items():
-            table = _table(rows)
-            for path, entry in self._entries[parent].items():
-                if table is not None and entry < table.shape[1]:
-                    values[path], there[path] = table[:, entry], np.ones(count, dtype=np.bool_)
-                    continue
-                for k, row in enumerate(rows):
-                    found = ABSENT if row is ABSENT else FieldPath(path, (entry,)).value(row)
-                    if found is not ABSENT:
-                        values[path][k] = self._number(path, found)
-                        there[path][k] = True
+            for entries in lists:
+                entries.take(k, message)
+        for entries in lists:
+            table = entries.table()
+            for column, path in enumerate(entries.paths):
+                there[path][entries.at] = True
+                if table is not None:
+                    values[path][entries.at] = table[:, column]
+                else:
+                    numbers = [self._number(path, row[column]) for row in entries.rows if row[column] is not ABSENT]
+                    there[path][entries.at] = [row[column] is not ABSENT for row in entries.rows]
+                    values[path][there[path]] = numbers
         for path in self.paths:
             self.values[path].append(values[path])
             self.there[path].append(there[path])
@@ -249,12 +248,44 @@ def _joined(parts: Sequence[Any], kind: Any) -> Any:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=kind)
 
 
-def _table(rows: list[Any]) -> Floats | None:
-    """Return lists of as many plain numbers as an array (n, entries); None if they are none."""
-    if not rows or not all(type(row) is list and len(row) == len(rows[0]) for row in rows):
-        return None
-    try:
-        table = np.array(rows)
-    except (ValueError, OverflowError):
-        return None
-    return table if table.ndim == 2 and table.dtype == np.float64 else None
+@dataclass(eq=False)
+class _Entries:
+    """Some entries of one list in messages; of many plain numbers one array is made.
+
+    Attributes:
+        parent: where the list is.
+        paths: of the entries, as they are written.
+        numbers: theirs.
+        at: which messages have the list.
+        rows: its entries in each of these, ABSENT beyond its end.
+        last: the largest of the numbers.
+    """
+
+    parent: FieldPath
+    paths: tuple[str, ...]
+    numbers: tuple[int, ...]
+    at: list[int] = field(default_factory=list)
+    rows: list[list[Any]] = field(default_factory=list)
+    last: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.last = max(self.numbers)
+
+    def take(self, k: int, message: Any) -> None:
+        """Take the entries of message k."""
+        found = self.parent.value(message)
+        if found is ABSENT:
+            return
+        self.at.append(k)
+        if type(found) is list and len(found) > self.last:
+            self.rows.append([found[number] for number in self.numbers])
+        else:
+            self.rows.append([entry_of(found, number) for number in self.numbers])
+
+    def table(self) -> Floats | None:
+        """Return the rows as an array; None if not all are plain numbers."""
+        try:
+            table = np.array(self.rows)
+        except ValueError:  # lists of several lengths
+            return None
+        return table.astype(np.float64) if table.ndim == 2 and table.dtype.kind in "bif" else None

@@ -58,13 +58,20 @@ def _below(value: Any, step: str | int | tuple[str], above: Any) -> Any:
     if isinstance(step, str):
         # of a plain mapping without asking the abstract one, which takes longer than all else
         return value.get(step, ABSENT) if type(value) is dict or isinstance(value, Mapping) else ABSENT
-    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__getitem__"):
-        return ABSENT
     if isinstance(step, tuple):
+        if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__getitem__"):
+            return ABSENT
         names: Any = [one.get("name") if isinstance(one, Mapping) else None for one in value]
         if isinstance(above, Mapping) and not any(name is not None for name in names):
             names = above.get("name")
         if not isinstance(names, list | tuple) or step[0] not in names:
             return ABSENT
         step = names.index(step[0])
-    return value[step] if step < len(value) else ABSENT
+    return entry_of(value, step)
+
+
+def entry_of(value: Any, number: int) -> Any:
+    """Return an entry of a list; `ABSENT` beyond its end, or if it is none."""
+    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__getitem__"):
+        return ABSENT
+    return value[number] if number < len(value) else ABSENT

@@ -1,6 +1,7 @@
 """Values of any messages over time: one motion in every encoding, excerpts that read as the log does."""
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -74,6 +75,17 @@ def test_entries_of_a_list_are_read_alike_whatever_other_messages_hold(odd):
         times, values = zip(*expected, strict=True)
         np.testing.assert_array_equal(series[place].time, times)
         np.testing.assert_array_equal(series[place].value, [float(words.get(value, value)) for value in values])
+
+
+def test_of_long_lists_the_entries_that_are_asked_for_are_kept():
+    """All of them took six times the log."""
+    data = json_log(*((10 * k, {"d": [k + 0.5 * n for n in range(10_000)]}) for k in range(1, 101)))
+    tracemalloc.start()
+    series = fields(data, ("/a", "d[0]"), ("/a", "d[9999]")).series
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert series["/a", "d[9999]"].value.tolist() == [k + 4999.5 for k in range(1, 101)]
+    assert peak < 2 * len(data)
 
 
 def test_samples_are_put_in_order_and_repeated_ones_are_one():

@@ -151,7 +151,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         payload = store.load(name, key)
         if payload is None:
             return None
-        rtsys.initialize(self.targetctx)  # numba does all that compiling needs, which takes half a second, before
+        rtsys.initialize(self.targetctx)  # code needs no more; numba refreshes all that compiling needs: half a second
         try:
             result = CompileResult._rebuild(self.targetctx, *pickle.loads(payload))
         except Exception:  # whole, and yet of no use: compiling it again mends it
