@@ -22,7 +22,7 @@ from replay.collision.way_sieve import root_gap, root_ratio
 from replay.collision.ways import center_gap
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel
 
 COUNTS = 2
 BY_FRAMES, IN_DOUBT = range(COUNTS)
@@ -111,7 +111,7 @@ def sort_out(
                 kinds[p] = QUIET
 
 
-@leaf_kernel
+@inlined_kernel
 def least_apart(
     volumes: Volumes,
     centers: Floats,
