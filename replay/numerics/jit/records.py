@@ -82,14 +82,14 @@ class _Fields(AttributeTemplate):  # type: ignore[misc]
         return record.fields[names.index(name)] if name in names else None
 
 
-@lower_getattr_generic(Record)
+@lower_getattr_generic(Record)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, record: Record, address: Any, name: str) -> Any:
     place = record.named_tuple._fields.index(name)
     value = builder.load(cgutils.gep_inbounds(builder, address, 0, place))
     return impl_ret_borrowed(context, builder, record.fields[place], value)
 
 
-@unbox(Record)
+@unbox(Record)  # type: ignore[untyped-decorator]
 def _laid_down(record: Record, value: Any, context: Any) -> Any:
     """Write what a named tuple holds to the stack of the function that Python calls."""
     native = context.unbox(types.NamedTuple(record.fields, record.named_tuple), value)
