@@ -91,7 +91,15 @@ def _field(context: Any, builder: Any, record: Record, address: Any, name: str) 
 
 @unbox(Record)  # type: ignore[untyped-decorator]
 def _laid_down(record: Record, value: Any, context: Any) -> Any:
-    """Write what a named tuple holds to the stack of the function that Python calls."""
-    native = context.unbox(types.NamedTuple(record.fields, record.named_tuple), value)
+    """Write what a named tuple holds to the stack of the function that Python calls, and give its arrays back."""
+    held = types.NamedTuple(record.fields, record.named_tuple)
+    native = context.unbox(held, value)
     address = cgutils.alloca_once_value(context.builder, native.value)
-    return NativeValue(address, is_error=native.is_error, cleanup=native.cleanup)
+
+    def give_back() -> None:
+        if native.cleanup is not None:
+            native.cleanup()
+        if context.context.enable_nrt:
+            context.context.nrt.decref(context.builder, held, native.value)
+
+    return NativeValue(address, is_error=native.is_error, cleanup=give_back)
