@@ -7,9 +7,8 @@ that reaches into numba, `progress` what the user is told.
 
 from __future__ import annotations
 
-from replay.numerics.jit.entries import compile_entries, entries_of, entry, rare_entry
+from replay.numerics.jit.entries import compile_entries, entries_of, entry, rare_entry, record, record_like
 from replay.numerics.jit.policy import inlined_kernel, kernel, leaf_kernel
-from replay.numerics.jit.records import record, record_like
 
 __all__ = [
     "compile_entries",

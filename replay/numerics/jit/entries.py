@@ -14,12 +14,28 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
+from numba import typeof, types
 
-from replay.numerics.jit import compiler, progress, store
+from replay.numerics.jit import compiler, progress, records, store
 from replay.numerics.jit.reach import key_of, name_of, reached
 from replay.numerics.remarks import remark
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def record(named_tuple: Any, *fields: Any) -> Any:
+    """Return the numba type of a named tuple that Python gives to kernels, given those of its fields in order."""
+    if compiler.AVAILABLE:
+        records.are_records(named_tuple)
+        return records.Record(named_tuple, fields)
+    if len({*fields}) == 1:
+        return types.NamedUniTuple(fields[0], len(fields), named_tuple)
+    return types.NamedTuple(fields, named_tuple)
+
+
+def record_like(made: Any) -> Any:
+    """Return the numba type of named tuples like one that was made, with those it holds."""
+    return record(type(made), *(record_like(field) if isinstance(field, tuple) else typeof(field) for field in made))
 
 
 def entry(*arguments: Any) -> Callable[[Function], Function]:

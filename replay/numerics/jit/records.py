@@ -5,8 +5,9 @@ call, which are packed and unpacked in every function on the way. That was half 
 Here a record is laid down once, where Python calls, and a kernel that reads a field of it loads that field. A named
 tuple that a kernel makes is one as numba has it.
 
-All of it is numba's public way of adding a type. Nothing writes to a record, so its address is marked as one that
-nobody else writes through: fields are loaded once, before loops, as arguments are.
+The type is added to numba in its public way, but for names that stand inside it (`NEEDED`, see `compiler`). Nothing
+writes to a record, and its address is marked as one that nobody else writes through (`linking`): fields are loaded
+once, before loops, as arguments are.
 """
 
 from __future__ import annotations
@@ -15,9 +16,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import typeof, types
-from numba.core import cgutils
-from numba.core.imputils import impl_ret_borrowed
-from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
@@ -27,6 +25,21 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+
+NEEDED: tuple[tuple[Any, tuple[str, ...]], ...] = ()
+"""What of numba is needed here: names by where they are; empty where it cannot be imported."""
+
+try:
+    from numba.core import cgutils, imputils
+    from numba.core.typing.templates import AttributeTemplate
+
+    NEEDED = (
+        (cgutils, ("gep_inbounds", "alloca_once_value")),
+        (imputils, ("impl_ret_borrowed",)),
+        (AttributeTemplate, ("resolve",)),
+    )
+except ImportError:  # another numba
+    AttributeTemplate: Any = object  # type: ignore[no-redef]
 
 
 class Record(types.Type):  # type: ignore[misc]
@@ -38,28 +51,18 @@ class Record(types.Type):  # type: ignore[misc]
         super().__init__(name=f"{named_tuple.__module__}.{named_tuple.__qualname__}({parts})")
 
 
-class Layout(ir.LiteralStructType):  # type: ignore[misc]
+class RecordLayout(ir.LiteralStructType):  # type: ignore[misc]
     """How a record lies in memory; a class of its own, so that its address can be told from others."""
 
 
 def is_address(kind: Any) -> bool:
     """Return whether an LLVM type is the address of a record."""
-    return isinstance(getattr(kind, "pointee", None), Layout)
+    return isinstance(getattr(kind, "pointee", None), RecordLayout)
 
 
-def record(named_tuple: Any, *fields: Any) -> Record:
-    """Return the numba type of a named tuple that Python gives to kernels, given those of its fields in order."""
+def are_records(named_tuple: Any) -> None:
+    """Let named tuples of a class that Python gives to kernels be records."""
     typeof_impl.register(named_tuple)(_type_of)
-    return Record(named_tuple, fields)
-
-
-def record_like(made: Any) -> Record:
-    """Return the numba type of named tuples like one that was made, with those it holds."""
-    for field in made:
-        if isinstance(field, tuple):
-            record_like(field)
-    typeof_impl.register(type(made))(_type_of)
-    return _type_of(made, None)
 
 
 def _type_of(value: Any, context: Any) -> Record:
@@ -67,13 +70,12 @@ def _type_of(value: Any, context: Any) -> Record:
 
 
 @register_model(Record)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _RecordModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, record: Record) -> None:
         parts = [manager.lookup(field).get_value_type() for field in record.fields]
-        super().__init__(manager, record, ir.PointerType(Layout(parts)))
+        super().__init__(manager, record, ir.PointerType(RecordLayout(parts)))
 
 
-@infer_getattr
 class _Fields(AttributeTemplate):  # type: ignore[misc]
     key = Record
 
@@ -82,11 +84,15 @@ class _Fields(AttributeTemplate):  # type: ignore[misc]
         return record.fields[names.index(name)] if name in names else None
 
 
+if NEEDED:
+    infer_getattr(_Fields)
+
+
 @lower_getattr_generic(Record)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, record: Record, address: Any, name: str) -> Any:
     place = record.named_tuple._fields.index(name)
     value = builder.load(cgutils.gep_inbounds(builder, address, 0, place))
-    return impl_ret_borrowed(context, builder, record.fields[place], value)
+    return imputils.impl_ret_borrowed(context, builder, record.fields[place], value)
 
 
 @unbox(Record)  # type: ignore[untyped-decorator]
