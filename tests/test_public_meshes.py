@@ -99,7 +99,7 @@ def area_counted_once(triangles):
         near = np.flatnonzero(np.abs((middle - corners[0]) @ n) < flat)
         edges = np.roll(corners, -1, axis=0) - corners
         held = np.cross(edges[:, None], middle[near] - corners[:, None]) @ n
-        number[near[(held > -flat**2).all(axis=0)]] += 1
+        number[near[(held > -(flat**2)).all(axis=0)]] += 1
     return 0.5 * float(np.sum(twice / np.maximum(number, 1.0)))
 
 

@@ -97,7 +97,8 @@ def _disorder(path: KeyPath, series: Series, window: Window, steps: Integers) ->
     if window.published and steps.min() >= -OFTEN:  # messages that overtake each other; else a clock that was set
         order = np.argsort(time, kind="stable")
         check_turns(path, time[order], series.value[order, :3] if series.value.ndim > 1 else series.value[order])
-    return f"has times in the log that do not increase: after {window.shown(time[at])} comes {window.shown(time[at + 1])}"
+    before, after = map(window.shown, time[at : at + 2])
+    return f"has times in the log that do not increase: after {before} comes {after}"
 
 
 _WAY_OUT = "channel and frame_id do not tell them apart: record one alone, or each on a topic of its own"
