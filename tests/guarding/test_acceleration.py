@@ -1,5 +1,6 @@
 """Where a joint's acceleration is beyond its limit: beside finite differences of its positions q(s(t))."""
 
+import itertools
 import math
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_stretches_beyond_a_limit_are_those_of_the_differences(seed, limits):
         worst = (np.abs(acceleration[within]) / limit[within]).max(initial=0.0)
         assert one.acceleration / one.limit >= worst - 1e-5 / one.limit
     assert (inside == beyond)[clear].all()
-    assert all(a.end < b.begin for a, b in zip(found, found[1:], strict=False)), "stretches that touch are one"
+    assert all(a.end < b.begin for a, b in itertools.pairwise(found)), "stretches that touch are one"
 
 
 @pytest.mark.parametrize("seed", range(12))
