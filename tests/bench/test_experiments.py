@@ -94,6 +94,15 @@ def test_the_measured_curves_are_those_of_the_scenarios():
         assert target.shapes["plate"].size == (side / 100, side / 100)
 
 
+def test_fits_are_drawn_of_the_plates_without_a_back():
+    _, panels = prediction.run_fit(FOLDER)
+    assert [panel.title for panel in panels] == [
+        f"II. {plate} cm sensor, 20 cm plate\n{reading.name}"
+        for reading in (SELF, DELTA_STRAY)
+        for plate in ("5 x 5", "4 x 20")
+    ]
+
+
 def test_the_command_writes_tables_and_drawings(tmp_path, capsys):
     arguments = ["experiments", "II", "III", "IV", "--scenarios", str(FOLDER), "-o", str(tmp_path)]
     assert run([*arguments, "--format", "json"]) is ExitCode.FINE

@@ -283,6 +283,18 @@ def test_random_poses_show_which_pairs_never_and_always_touch(tmp_path):
     assert loaded(tmp_path).collision.disable[0].reason == done.checked[0][2]
 
 
+def test_pairs_are_looked_at_in_random_poses_when_that_is_asked_for(tmp_path):
+    links = [made.link(name, BOX) for name in ("a", "b", "c")]
+    far = '<origin xyz="9 0 0"/><axis xyz="0 0 1"/>'
+    joints = [made.joint(f"to_{b}", a, b, "continuous", far) for a, b in (("a", "b"), ("b", "c"))]
+    (tmp_path / "r.urdf").write_text(made.robot(*links, *joints))
+    words = ["import", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "p.yaml"), "--overwrite"]
+    assert command(words) is ExitCode.FINE
+    assert "random poses" not in (tmp_path / "p.yaml").read_text()
+    assert command([*words, "--check-collisions", "7"]) is ExitCode.FINE
+    assert "never in contact in 7 random poses" in (tmp_path / "p.yaml").read_text()
+
+
 def test_the_command_says_what_was_lost_and_leaves_with_3(tmp_path, capsys):
     (tmp_path / "r.urdf").write_text(made.robot(made.link("a", BOX)))
     words = ["import", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "p.yaml")]
