@@ -64,7 +64,8 @@ _ours: dict[tuple[Path, int], Claim] = {}
 
 @contextlib.contextmanager
 def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
-    """Claim a folder for a `with` block; it is made when it is not there, and removed when it is empty at the end then.
+    """Claim a folder for a `with` block; it is made when it is not there, with those above
+    it, and they are removed when they are empty at the end then.
 
     Claims of the same thread may lie within each other.
 
@@ -82,7 +83,7 @@ def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
     if key in _ours:
         yield _ours[key]
         return
-    made = not shared and not directory.exists()
+    made = [] if shared else [folder for folder in (directory, *directory.parents) if not folder.exists()]
     try:
         if not shared:
             directory.mkdir(parents=True, exist_ok=True)
@@ -98,9 +99,9 @@ def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
         del _ours[key]
         if handle is not None:
             _release(directory, handle)
-        if made:
-            with contextlib.suppress(OSError):
-                directory.rmdir()
+        with contextlib.suppress(OSError):
+            for folder in made:
+                folder.rmdir()
 
 
 def _acquire(directory: Path, shared: bool) -> int:
