@@ -16,10 +16,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import psutil
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from replay.errors import BusyError
@@ -36,7 +34,7 @@ _PAUSE = 0.02
 class Signature(TypedDict):
     """What the lock's file says of who has it."""
 
-    process: Annotated[int, Field(gt=0, lt=1 << 31)]
+    process: int
     host: str
     since: str
 
@@ -154,6 +152,8 @@ def _user(handle: int) -> tuple[str, bool]:
         try:
             os.lseek(handle, 0, os.SEEK_SET)
             signed = typed(read_json(os.read(handle, 4096)), Signature)
+            if not 0 < signed["process"] < 1 << 31:
+                raise ValueError("no number of a process")
             break
         except (OSError, ValueError):
             time.sleep(_PAUSE)
