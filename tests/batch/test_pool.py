@@ -9,6 +9,7 @@ import time
 import psutil
 import pytest
 
+from replay.batch.interpreter import begin
 from replay.batch.pool import Pool, _Worker
 from replay.batch.task import Ending, Task
 from replay.batch.worker import Ready, Start
@@ -154,7 +155,7 @@ def test_memory_is_limited_also_where_a_task_is_over_before_anyone_looks():
 
 def test_a_free_worker_may_keep_half_of_what_a_task_may_have():
     inbox = queue.SimpleQueue()
-    worker = _Worker(Start(behave, None), inbox)
+    worker = _Worker(Start(behave, None), inbox, begin(behave.__module__, ()))
     try:
         found, message = inbox.get(timeout=60.0)
         assert found is worker and message == Ready()
