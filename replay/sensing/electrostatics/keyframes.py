@@ -4,13 +4,16 @@ A diagonal entry of the increase grows by orders of magnitude while a body comes
 
     E_k = sum over points j of the bodies, with area A_j,  of A_j phi_k(x_j)^2 / max(d_j, 3 mm),
 
-d_j the distance to the unit; their quotient hardly changes. So ln(dC_kk / E_k) is interpolated, E in every frame.
-Entries beside the diagonal and shares of shapes are interpolated over the root of the product of their diagonals.
+d_j the distance to the unit; their quotient changes little, and mostly as a power of E_k. So what is interpolated is
+ln(dC_kk / E_k), with ln E_k, which is known in every frame, as its guide (`spline.guided`). Entries beside the diagonal
+and shares of shapes are interpolated over the root of the product of their diagonals, guided by the mean of their ln E.
 
 A motion falls into pieces, at stops, jumps and kinks of the script, and where what touches or is resolved changes. Each
 begins with five keys. The frame in the middle between two keys is solved and compared with the prediction of all keys
 so far: while it is missed by more than the tolerance, both halves are asked in the next round. What the last question
-between two keys missed is the error in time there. Pieces know nothing of each other, nor of other blocks.
+between two keys missed is the error in time there. How far a frame is along a piece is its share of the frames, and how
+much ln E has changed, so that keys are dense where a body comes near. Pieces know nothing of each other, nor of other
+blocks.
 """
 
 from __future__ import annotations
@@ -24,11 +27,14 @@ import numpy as np
 
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.bem import BemReading
-from replay.sensing.electrostatics.spline import spline
+from replay.sensing.electrostatics.spline import guided
 
 Solve = Callable[[int], BemReading | None]
 
 _FIRST_KEYS = 5
+_EVEN = 2.0
+"""Change of ln E that counts as much as all frames of a piece."""
+
 _FLOOR = 5e-3
 """Share of the largest entry below which others need not be followed."""
 
@@ -123,19 +129,23 @@ class _Piece:
     def __init__(self, reading: Solve, proxy: Floats, first: int, last: int) -> None:
         self._reading = reading
         self._proxy = proxy[first : last + 1]
+        self._guide = _each(math.log, self._proxy)
         self._first = first
         self._count = last - first + 1
+        change = np.abs(np.diff(self._guide, axis=0)).max(axis=1)
+        self._along = np.concatenate([[0.0], np.cumsum(change + _EVEN / max(self._count - 1, 1))])
         self._keys: dict[int, BemReading] = {}
 
     def followed(self, tolerance: float) -> Followed | None:
         """Return the readings of the piece."""
-        start = np.unique(np.linspace(0, self._count - 1, _FIRST_KEYS).round().astype(int)).tolist()
+        places = np.linspace(0.0, self._along[-1], _FIRST_KEYS)
+        start = np.unique(np.abs(self._along[:, None] - places).argmin(axis=0)).tolist()
         if not self._solve(start):
             return None
         waiting = [(a, b) for a, b in pairwise(start) if b - a > 1]
         missed = np.zeros(self._count)
         while waiting:
-            asked = [(a + b) // 2 for a, b in waiting]
+            asked = [self._middle(a, b) for a, b in waiting]
             predicted = self._predicted(np.array(asked, dtype=np.float64))[0]
             if not self._solve(asked):
                 return None
@@ -154,6 +164,11 @@ class _Piece:
         for key, value in self._keys.items():
             increase[key], error[key], shares[key], solved[key] = value.increase, value.error, value.shares, True
         return Followed(increase, error, shares, solved)
+
+    def _middle(self, first: int, last: int) -> int:
+        """Return the frame between two others that is as far along from both as can be."""
+        along = self._along[first + 1 : last]
+        return first + 1 + int(np.abs(2.0 * along - self._along[first] - self._along[last]).argmin())
 
     def _solve(self, frames: list[int]) -> bool:
         for frame in frames:
@@ -184,9 +199,10 @@ class _Piece:
         wrong = np.stack([each.error for each in readings]) / product
         beside = (value / product).reshape(m, -1)
         columns = np.concatenate([ratio, beside, share.reshape(m, -1)], axis=1)
-        places = np.array(keys, dtype=np.float64)
-        curve = spline(places, columns, at)
-        frames = at.astype(int)
+        places, frames = np.array(keys, dtype=np.float64), at.astype(int)
+        pairs = (0.5 * (self._guide[:, :, None] + self._guide[:, None, :])).reshape(self._count, -1)
+        guide = np.concatenate([self._guide, np.tile(pairs, 1 + share.shape[1])], axis=1)
+        curve = guided(places, columns, at, guide[keys], guide[frames])
         root = np.sqrt(_each(math.exp, curve[:, :k]) * self._proxy[frames])
         product = root[:, :, None] * root[:, None, :]
         increase = curve[:, k : k + k * k].reshape(-1, k, k)
