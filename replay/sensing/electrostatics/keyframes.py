@@ -67,26 +67,35 @@ def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
     """
     n = len(points)
     step = np.abs(np.diff(points, axis=0)).reshape(n - 1, -1).max(axis=1) if n > 1 else np.zeros(0)
-    bend = np.abs(np.diff(points, n=2, axis=0)).reshape(max(n - 2, 0), -1).max(axis=1) if n > 2 else np.zeros(0)
     cut = state[1:] != state[:-1]
+    kinks = _kinks(points, step)
     ends = []
     for i in range(n - 1):
         around = max(step[i - 1] if i else 0.0, step[i + 1] if i + 2 < n else 0.0)
         jumps = n > 2 and step[i] > 5.0 * around and step[i] > 0.0
-        if cut[i] or jumps:
+        # a kink between two frames bends the motion at both
+        if cut[i] or jumps or (kinks[i] and kinks[i + 1]):
             ends.append((i, i + 1))
-            continue
-        if i == 0:
-            continue
-        around = max(bend[i - 2] if i > 1 else 0.0, bend[i] if i < len(bend) else 0.0)
-        kinks = bend[i - 1] > 3.0 * around and bend[i - 1] > 0.02 * max(step[i - 1], step[i])
-        if kinks or (step[i] == 0.0) != (step[i - 1] == 0.0):
+        elif i > 0 and ((kinks[i] and not kinks[i - 1]) or (step[i] == 0.0) != (step[i - 1] == 0.0)):
             ends.append((i, i))
     first, result = 0, []
     for last, following in ends:
         result.append((first, last))
         first = following
     return [*result, (first, n - 1)]
+
+
+def _kinks(points: Floats, step: Floats) -> Flags:
+    """Return at which frames (n,) a motion bends more than on both sides of them, up to three frames away."""
+    n = len(points)
+    result = np.zeros(n, np.bool_)
+    if n > 2:
+        bend = np.zeros(n + 6)
+        bend[4 : n + 2] = np.abs(np.diff(points, n=2, axis=0)).reshape(n - 2, -1).max(axis=1)
+        around = np.min([np.maximum(bend[3 - k : n + 3 - k], bend[3 + k : n + 3 + k]) for k in (1, 2, 3)], axis=0)
+        own = bend[3 : n + 3]
+        result[1:-1] = (own > 3.0 * around)[1:-1] & (own[1:-1] > 0.02 * np.maximum(step[:-1], step[1:]))
+    return result
 
 
 def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tolerance: float) -> Followed | None:
