@@ -37,7 +37,7 @@ class Capacitive(SensorKind):
     name = "capacitive"
     part = CapacitiveSensorPart
     method = CapacitiveMethod
-    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "field": 1, "bem": 1}
+    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "field": 2, "bem": 2}
     slow = ELECTROSTATIC
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation

@@ -5,7 +5,7 @@ its images, fine where it is near the bodies; phi comes from the unit's own mesh
 level. With the levels' values v0, v1, v2,
 
     value = v2 + (v2 - v1) / (rho - 1),    rho = (v1 - v0) / (v2 - v1) within 1.8 .. 4,
-    error = |value - v2| / 2 + 2e-4 value + |effect of the extrapolation of phi| / 2.
+    error = |value - v2| + 2e-4 value + |effect of the extrapolation of phi| / 2.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def read(unit: Unit, placement: PosedBodies) -> BemReading | None:
     values, shares = [each[0].increase for each in found], [each[0].shares for each in found]
     value, share = _extrapolated(values), _extrapolated(shares)
     share += (value - share.sum(axis=0)) * np.abs(share) / np.maximum(np.abs(share).sum(axis=0), 1e-300)
-    error = 0.5 * np.abs(value - values[2]) + _ROUNDING * np.abs(value) + 0.5 * np.abs(found[2][1])
+    error = np.abs(value - values[2]) + _ROUNDING * np.abs(value) + 0.5 * np.abs(found[2][1])
     return BemReading(value, error, share)
 
 
