@@ -93,16 +93,17 @@ class FieldSolver:
 
     def read(self, placement: PosedBodies) -> BemReading | None:
         """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer."""
-        found = self._read(placement, _NODES)
+        found = self.solve(placement, _NODES)
         if found is None:
             return None
         own = found.increase.diagonal()[: self._sensors]
         counts = own > _FLOOR * own.max()
         if (found.error.diagonal()[: self._sensors][counts] > self._accuracy * own[counts]).any():
-            return self._read(placement, 2 * _NODES) or found
+            return self.solve(placement, 2 * _NODES) or found
         return found
 
-    def _read(self, placement: PosedBodies, count: int) -> BemReading | None:
+    def solve(self, placement: PosedBodies, count: int) -> BemReading | None:
+        """Return what bodies change in one pose by so many nodes and by half of them; None as `read`."""
         with growing:
             systems = self._systems(placement, count)
         if systems is None:

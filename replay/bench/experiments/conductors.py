@@ -1,0 +1,108 @@
+"""Experiments V and VI: what the thesis's model has no words for, by electrostatics.
+
+V: two sensors side by side, a hand over one of them, driven alone and together. VI: a person who floats, who is
+connected to earth by 100 pF (the human body model of electrostatic discharge, IEC 61340-3-1), and who is grounded.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from replay.bench.experiments.measured import PICOFARAD
+from replay.bench.experiments.tables import Cell, Table
+from replay.numerics.arrays import Floats
+from replay.scenario.curve_plot import Line, Panel
+from replay.scenario.load import load
+from replay.scenario.methods import Model
+from replay.scenario.model import Scenario
+from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.capacitive.part import CapacitiveMethod
+from replay.simulation import simulate
+
+_EARTH = {"floating": 0.0, "100 pF": 100.0 * PICOFARAD, "grounded": math.inf}
+_AT = "distance_cm"
+
+
+def run_neighbours(_folder: Path) -> tuple[list[Table], list[Panel]]:
+    """Return table and drawing of experiment V: by how much outputs fall for a hand that is 2 m away at first."""
+    scenario = _shipped("neighbours")
+    falls: dict[str, Floats] = {}
+    for drive in ("alone", "together"):
+        found = _read(scenario, CapacitiveMethod(method="field", drive=drive))
+        for k, sensor in enumerate(("covered", "neighbour")):
+            falls[f"{sensor}, {drive} [mV]"] = 1e3 * (found.output_voltage[0, k] - found.output_voltage[:, k])
+    thesis = _read(scenario, CapacitiveMethod())
+    for k, sensor in enumerate(("covered", "neighbour")):
+        falls[f"{sensor}, thesis [mV]"] = 1e3 * (thesis.output_voltage[0, k] - thesis.output_voltage[:, k])
+    last = {name: float(fall[-1]) for name, fall in falls.items()}
+    alone, together = (100.0 * last[f"neighbour, {d} [mV]"] / last[f"covered, {d} [mV]"] for d in ("alone", "together"))
+    remarks = [
+        f"A hand at {100 * _positions(scenario)[-1]:g} cm over one sensor moves the one beside it by {alone:+.1f} %"
+        f" of what the covered one falls when driven alone, and by {together:+.1f} % when driven together.",
+        "The thesis's model has no capacitances between plates: its sensors do not know of each other.",
+    ]
+    title = "V. Two neighbouring sensors, a hand over one of them: by how much output voltages fall"
+    return _shown("experiment_5_neighbours", title, "fall of the output [mV]", scenario, falls, remarks)
+
+
+def run_person(_folder: Path) -> tuple[list[Table], list[Panel]]:
+    """Return table and drawing of experiment VI: what a person adds to a sensor's capacitance, by how he is earthed."""
+    scenario = _shipped("person")
+    adds: dict[str, Floats] = {}
+    for name, earth in _EARTH.items():
+        person = scenario.links["person"].model_copy(update={"earth": earth})
+        found = _read(_copy(scenario, links={**scenario.links, "person": person}), CapacitiveMethod(method="field"))
+        assert found.increase is not None
+        adds[f"{name} [pF]"] = found.increase[:, 0] / PICOFARAD
+    adds["thesis [pF]"] = _read(scenario, CapacitiveMethod()).capacitance[:, 0] / PICOFARAD
+    person, floating, grounded = (adds[f"{name} [pF]"] for name in ("100 pF", "floating", "grounded"))
+    near, far = -1, 1
+    remarks = [
+        f"With 100 pF to earth he reads {100.0 * float((person / grounded).min() - 1.0):+.1f} % at the most beside a"
+        f" grounded person; floating, {100.0 * float(floating[near] / grounded[near] - 1.0):+.0f} % at"
+        f" {100 * _positions(scenario)[near]:g} cm and {100.0 * float(floating[far] / grounded[far] - 1.0):+.0f} % at"
+        f" {100 * _positions(scenario)[far]:g} cm.",
+        "The thesis's model, with the vacuum's permittivity, knows no earth and reads the same of all three.",
+    ]
+    title = "VI. A person before a plate with a grounded sheet behind it: what he adds to its capacitance"
+    return _shown("experiment_6_person", title, "increase [pF]", scenario, adds, remarks)
+
+
+def _shipped(name: str) -> Scenario:
+    with resources.as_file(resources.files("replay.bench.experiments").joinpath(f"{name}.yaml")) as path:
+        return load(path)
+
+
+def _copy(scenario: Scenario, **changed: Any) -> Scenario:
+    other = scenario.model_copy(update=changed)
+    other._provenance = scenario.provenance
+    return other
+
+
+def _read(scenario: Scenario, method: CapacitiveMethod) -> CapacitiveColumns:
+    """Return the readings of all frames, each of them solved."""
+    (block,) = simulate(scenario, model=Model(capacitive=method), savings=False)
+    found: CapacitiveColumns = block.readings["capacitive"]
+    return found
+
+
+def _positions(scenario: Scenario) -> list[float]:
+    return [float(point.position) for point in scenario.motion.points["distance"]]
+
+
+def _shown(
+    name: str, title: str, y: str, scenario: Scenario, columns: dict[str, Floats], remarks: list[str]
+) -> tuple[list[Table], list[Panel]]:
+    """Return the table over distances, and the drawing of all but the first, which is far away."""
+    at = [100.0 * position for position in _positions(scenario)]
+    rows: list[dict[str, Cell]] = [
+        {_AT: at[i], **{column: float(values[i]) for column, values in columns.items()}} for i in range(len(at))
+    ]
+    lines = [
+        Line(column.rpartition(" [")[0], at[1:], values[1:], points=True, color=color)
+        for color, (column, values) in enumerate(columns.items())
+    ]
+    return [Table(name, title, rows, remarks)], [Panel(title.partition(":")[0], _AT, y, lines)]
