@@ -171,7 +171,7 @@ def _shifts(case: Configuration) -> Floats:
 
 
 def _row(method: str, seconds: Sequence[float], errors: Floats) -> Row:
-    """Return the times of configurations, of each its fastest pose, and the errors of all plates, none of them wrong."""
+    """Return times of configurations, of each its fastest pose, and errors of all plates, none of which is wrong."""
     return Row(
         case="all",
         method=method,

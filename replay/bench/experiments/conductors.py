@@ -31,21 +31,22 @@ def run_neighbours(_folder: Path) -> tuple[list[Table], list[Panel]]:
     scenario = _shipped("neighbours")
     falls: dict[str, Floats] = {}
     for drive in ("alone", "together"):
-        found = _read(scenario, CapacitiveMethod(method="field", drive=drive))
+        at, found = _read(scenario, CapacitiveMethod(method="field", drive=drive))
         for k, sensor in enumerate(("covered", "neighbour")):
             falls[f"{sensor}, {drive} [mV]"] = 1e3 * (found.output_voltage[0, k] - found.output_voltage[:, k])
-    thesis = _read(scenario, CapacitiveMethod())
+    _, thesis = _read(scenario, CapacitiveMethod())
     for k, sensor in enumerate(("covered", "neighbour")):
         falls[f"{sensor}, thesis [mV]"] = 1e3 * (thesis.output_voltage[0, k] - thesis.output_voltage[:, k])
     last = {name: float(fall[-1]) for name, fall in falls.items()}
     alone, together = (100.0 * last[f"neighbour, {d} [mV]"] / last[f"covered, {d} [mV]"] for d in ("alone", "together"))
     remarks = [
-        f"A hand at {100 * _positions(scenario)[-1]:g} cm over one sensor moves the one beside it by {alone:+.1f} %"
+        f"A hand at {at[-1]:g} cm over one sensor moves the one beside it by {alone:+.1f} %"
         f" of what the covered one falls when driven alone, and by {together:+.1f} % when driven together.",
-        "The thesis's model has no capacitances between plates: its sensors do not know of each other.",
+        "The thesis's model, here with the vacuum's permittivity and nothing fitted, adds up what each plate has before"
+        " it: no capacitances between plates, no shielding.",
     ]
     title = "V. Two neighbouring sensors, a hand over one of them: by how much output voltages fall"
-    return _shown("experiment_5_neighbours", title, "fall of the output [mV]", scenario, falls, remarks)
+    return _shown("experiment_5_neighbours", title, "fall of the output [mV]", at, falls, remarks)
 
 
 def run_person(_folder: Path) -> tuple[list[Table], list[Panel]]:
@@ -54,21 +55,22 @@ def run_person(_folder: Path) -> tuple[list[Table], list[Panel]]:
     adds: dict[str, Floats] = {}
     for name, earth in _EARTH.items():
         person = scenario.links["person"].model_copy(update={"earth": earth})
-        found = _read(_copy(scenario, links={**scenario.links, "person": person}), CapacitiveMethod(method="field"))
+        changed = _copy(scenario, links={**scenario.links, "person": person})
+        at, found = _read(changed, CapacitiveMethod(method="field"))
         assert found.increase is not None
         adds[f"{name} [pF]"] = found.increase[:, 0] / PICOFARAD
-    adds["thesis [pF]"] = _read(scenario, CapacitiveMethod()).capacitance[:, 0] / PICOFARAD
+    adds["thesis [pF]"] = _read(scenario, CapacitiveMethod())[1].capacitance[:, 0] / PICOFARAD
     person, floating, grounded = (adds[f"{name} [pF]"] for name in ("100 pF", "floating", "grounded"))
     near, far = -1, 1
     remarks = [
         f"With 100 pF to earth he reads {100.0 * float((person / grounded).min() - 1.0):+.1f} % at the most beside a"
         f" grounded person; floating, {100.0 * float(floating[near] / grounded[near] - 1.0):+.0f} % at"
-        f" {100 * _positions(scenario)[near]:g} cm and {100.0 * float(floating[far] / grounded[far] - 1.0):+.0f} % at"
-        f" {100 * _positions(scenario)[far]:g} cm.",
-        "The thesis's model, with the vacuum's permittivity, knows no earth and reads the same of all three.",
+        f" {at[near]:g} cm and {100.0 * float(floating[far] / grounded[far] - 1.0):+.0f} % at"
+        f" {at[far]:g} cm.",
+        "The thesis's model, here with the vacuum's permittivity and nothing fitted, knows no earth.",
     ]
     title = "VI. A person before a plate with a grounded sheet behind it: what he adds to its capacitance"
-    return _shown("experiment_6_person", title, "increase [pF]", scenario, adds, remarks)
+    return _shown("experiment_6_person", title, "increase [pF]", at, adds, remarks)
 
 
 def _shipped(name: str) -> Scenario:
@@ -82,22 +84,16 @@ def _copy(scenario: Scenario, **changed: Any) -> Scenario:
     return other
 
 
-def _read(scenario: Scenario, method: CapacitiveMethod) -> CapacitiveColumns:
-    """Return the readings of all frames, each of them solved."""
+def _read(scenario: Scenario, method: CapacitiveMethod) -> tuple[list[float], CapacitiveColumns]:
+    """Return the distances [cm] and the readings of all frames, each of them solved."""
     (block,) = simulate(scenario, model=Model(capacitive=method), savings=False)
-    found: CapacitiveColumns = block.readings["capacitive"]
-    return found
-
-
-def _positions(scenario: Scenario) -> list[float]:
-    return [float(point.position) for point in scenario.motion.points["distance"]]
+    return (100.0 * block.joint_positions[:, 0]).round(6).tolist(), block.readings["capacitive"]
 
 
 def _shown(
-    name: str, title: str, y: str, scenario: Scenario, columns: dict[str, Floats], remarks: list[str]
+    name: str, title: str, y: str, at: list[float], columns: dict[str, Floats], remarks: list[str]
 ) -> tuple[list[Table], list[Panel]]:
     """Return the table over distances, and the drawing of all but the first, which is far away."""
-    at = [100.0 * position for position in _positions(scenario)]
     rows: list[dict[str, Cell]] = [
         {_AT: at[i], **{column: float(values[i]) for column, values in columns.items()}} for i in range(len(at))
     ]

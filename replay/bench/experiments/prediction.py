@@ -254,7 +254,7 @@ def _signs(model: str, reading: Reading, predictions: Iterable[Prediction]) -> s
             beside = f" ({backed} with a grounded back plate)" if backed else ""
             parts.append(f"{side} cm plate {open_ones}{beside}")
     of_range = [100.0 * entry.worst_of_range for entry in chosen]
-    range_part = f"{min(of_range):.0f} .. {max(of_range):.0f} % of the curve's own range"
+    range_part = f"{min(of_range):.2g} .. {max(of_range):.2g} % of the curve's own range"
     by = "" if model == THESIS else f"{model}, "
     return f"{by}{reading.name}, worst point: {'; '.join(parts)}; {range_part}."
 
@@ -263,7 +263,10 @@ def _span(values: Sequence[float]) -> str:
     if not values:
         return ""
     low, high = 100.0 * min(values), 100.0 * max(values)
-    return f"{low:+.0f} %" if round(low) == round(high) else f"{low:+.0f} .. {high:+.0f} %"
+    digits = 0 if max(-low, high) >= 1.0 else 1
+    if round(low, digits) == round(high, digits):
+        return f"{low:+.{digits}f} %"
+    return f"{low:+.{digits}f} .. {high:+.{digits}f} %"
 
 
 def _panels(title: str, predictions: Iterable[Prediction]) -> list[Panel]:

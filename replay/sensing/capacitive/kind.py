@@ -110,6 +110,15 @@ class Capacitive(SensorKind):
 
         return suite.kernels(method=method.method, savings=savings)
 
+    def faults(
+        self, parts: Mapping[str, CapacitiveSensorPart], felt: Mapping[str, Sequence[str]], method: Any
+    ) -> Iterator[tuple[tuple[str, ...], str]]:
+        """See `SensorKind`: sensors that cannot be one unit."""
+        if method.method in ELECTROSTATIC:
+            from replay.sensing.electrostatics.notes import faults
+
+            yield from faults(parts, felt, method.method)
+
     def notes(
         self,
         parts: Mapping[str, CapacitiveSensorPart],
