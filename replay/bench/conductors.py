@@ -21,7 +21,7 @@ from replay.numerics import transforms
 from replay.numerics.arrays import Flags, Floats
 from replay.sensing.capacitive.sensor import CapacitiveSensor, Plate
 from replay.sensing.electrostatics.body import ConductorBody
-from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON
+from replay.sensing.electrostatics.conductors import FOUR_PI_EPSILON, kept_unit
 from replay.sensing.electrostatics.placement import PosedBodies
 from replay.sensing.electrostatics.unit import MOST_PANELS, Electrode, Unit
 
@@ -53,7 +53,7 @@ class Configuration:
     def unit(self, most_panels: int = MOST_PANELS) -> Unit:
         """Return the electrodes, what is behind as the last one."""
         electrodes = [Electrode(sensor.name, (outline(sensor.plates[0]),)) for sensor in self.plates]
-        return Unit([*electrodes, *([Electrode("back", self.behind)] if self.behind else [])], most_panels=most_panels)
+        return kept_unit([*electrodes, *([Electrode("back", self.behind)] if self.behind else [])], most_panels)
 
     def placed(self, T: Floats | None = None) -> PosedBodies:
         """Return the bodies as they are, or all moved alike by T (4, 4)."""
