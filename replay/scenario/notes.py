@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
@@ -68,7 +69,7 @@ def sensor_faults(scenario: Scenario, model: Model) -> list[Problem]:
         scenario.provenance.problem(("sensors", kind.name, *path), rule)
         for kind in KINDS.values()
         for path, rule in kind.faults(
-            scenario.sensors.of(kind.name), _felt(scenario, kind.name), getattr(model, kind.name)
+            scenario.sensors.of(kind.name), partial(_felt, scenario, kind.name), getattr(model, kind.name)
         )
     ]
 

@@ -198,9 +198,9 @@ class SensorKind(ABC):
         return sensor
 
     def faults(
-        self, parts: Mapping[str, Any], felt: Mapping[str, Sequence[str]], method: Any
+        self, parts: Mapping[str, Any], felt: Callable[[], Mapping[str, Sequence[str]]], method: Any
     ) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Yield what of sensors as they are written a method cannot compute; arguments and paths as of `notes`."""
+        """Yield what of sensors as they are written a method cannot compute; as `notes`, `felt` asked if it matters."""
         yield from ()
 
     def notes(

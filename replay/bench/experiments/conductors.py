@@ -60,10 +60,10 @@ def run_person(_folder: Path) -> tuple[list[Table], list[Panel]]:
         assert found.increase is not None
         adds[f"{name} [pF]"] = found.increase[:, 0] / PICOFARAD
     adds["thesis [pF]"] = _read(scenario, CapacitiveMethod())[1].capacitance[:, 0] / PICOFARAD
-    person, floating, grounded = (adds[f"{name} [pF]"] for name in ("100 pF", "floating", "grounded"))
+    earthed, floating, grounded = (adds[f"{name} [pF]"] for name in ("100 pF", "floating", "grounded"))
     near, far = -1, 1
     remarks = [
-        f"With 100 pF to earth he reads {100.0 * float((person / grounded).min() - 1.0):+.1f} % at the most beside a"
+        f"With 100 pF to earth he reads {100.0 * float((earthed / grounded).min() - 1.0):+.1f} % at the most beside a"
         f" grounded person; floating, {100.0 * float(floating[near] / grounded[near] - 1.0):+.0f} % at"
         f" {at[near]:g} cm and {100.0 * float(floating[far] / grounded[far] - 1.0):+.0f} % at"
         f" {at[far]:g} cm.",
