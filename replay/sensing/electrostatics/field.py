@@ -91,19 +91,22 @@ class FieldSolver:
             waiting = np.concatenate([first[~small], first[~small] + 1])
         return np.concatenate(done)
 
+    def solve(self, placement: PosedBodies, count: int) -> BemReading | None:
+        """Return what bodies change in one pose by so many nodes, and by half of them; None as of `read`."""
+        return self._read(placement, count)
+
     def read(self, placement: PosedBodies) -> BemReading | None:
         """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer."""
-        found = self.solve(placement, _NODES)
+        found = self._read(placement, _NODES)
         if found is None:
             return None
         own = found.increase.diagonal()[: self._sensors]
         counts = own > _FLOOR * own.max()
         if (found.error.diagonal()[: self._sensors][counts] > self._accuracy * own[counts]).any():
-            return self.solve(placement, 2 * _NODES) or found
+            return self._read(placement, 2 * _NODES) or found
         return found
 
-    def solve(self, placement: PosedBodies, count: int) -> BemReading | None:
-        """Return what bodies change in one pose by so many nodes and by half of them; None as `read`."""
+    def _read(self, placement: PosedBodies, count: int) -> BemReading | None:
         with growing:
             systems = self._systems(placement, count)
         if systems is None:
