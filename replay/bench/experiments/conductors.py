@@ -98,7 +98,7 @@ def _shown(
         {_AT: at[i], **{column: float(values[i]) for column, values in columns.items()}} for i in range(len(at))
     ]
     lines = [
-        Line(column.rpartition(" [")[0], at[1:], values[1:], points=True, color=color)
+        Line(column.rpartition(" [")[0], at[1:], values[1:], color=color)
         for color, (column, values) in enumerate(columns.items())
     ]
-    return [Table(name, title, rows, remarks)], [Panel(title.partition(":")[0], _AT, y, lines)]
+    return [Table(name, title, rows, remarks)], [Panel(title.partition(":")[0], _AT, y, lines, logarithmic=True)]
