@@ -169,7 +169,7 @@ def _poses(unknowns: int, bodies: int, plates: int) -> list[float]:
 
 
 def pace(report: Report, name: str) -> None:
-    """Add how many frames a second of processor time a shipped scenario has with `field`, all but recording included."""
+    """Add how many frames a shipped scenario has with `field` in a second of processor time, recording excluded."""
     scenario = shipped(name)
     if isinstance(scenario, str):
         report.tables[PACE] = [absent(name, "field", scenario)]

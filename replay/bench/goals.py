@@ -69,7 +69,7 @@ PROMISES: dict[str, Promise] = {
     "field.median": _at_most(f"{_FIELD}, median plate", _KNOWN, 0.01),
     "field.covered": Promise("plates whose error field's own estimate covers", _KNOWN, 0.95, ""),
     "field.motions": _at_most("field between and at keys of three motions, worst reading", "bem, each frame", 0.035),
-    "field.pace": Promise("field on carm_bodyguard, one core, recording excluded", "-", 1000.0, "frames/s"),
+    "field.pace": Promise("field on carm_bodyguard, processor time, recording excluded", "-", 1000.0, "frames/s"),
     "bem.worst": _at_most("bem, worst plate, beyond what is doubted of the truth", _KNOWN, 0.006),
     "pipeline.peer": Promise(f"{_PIPELINE}, rtol 1e-6", "python-fcl + 1000 rays + midpoint n=4 in NumPy", 100.0),
     "pipeline.real_time": Promise("the same at rtol 1e-4, one core", "real time at 60 Hz", 5.0, stretch=20.0),
