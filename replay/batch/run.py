@@ -156,7 +156,7 @@ def _run_orders(
         name, log = order.scenario.name, order.folder / LOG
         try:
             refuse_link(order.folder)
-            write_file(log, "")
+            write_file(log, "", lasting=False)  # a thousand that wait for the disk take seconds
         except WriteError as error:
             result = unwritable(CaseResult(name), error)
             _settle(result, file, directory)
