@@ -114,12 +114,14 @@ class FrameDecider:
         if len(rows) == 0:
             return unanswered(rows, np.empty((0, len(poses.local), 4, 4)), np.zeros((1, 1, 3, 3)))
         by_ways = found if self.savings and self.by_ways else None
+        chosen = wanted = None
+        if found is not None:
+            chosen, place = np.unique(rows[:, 2], return_inverse=True)
+            rows = rows.copy()
+            rows[:, 2] = place
         if by_ways is not None:
-            wanted = by_ways.wanted
-        else:
-            wanted = np.zeros((batch.relative.count, len(poses.local)), dtype=bool)
-            wanted[rows[:, 2]] = True
-        relative = batch.relative.of(poses.local, wanted)
+            wanted = by_ways.wanted[chosen]
+        relative = batch.relative.of(poses.local, chosen, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self.turning:
             turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))

@@ -84,10 +84,9 @@ def sort_out(
         wanted: (Q, n) link pairs and frames, set where a pair of theirs is NEAR.
         scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
     """
-    for k in range(kinds.shape[1]):
-        begin, _, end = stretch(k, intervals)
-        for p in range(len(pairs)):
-            a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
+    for p in range(len(pairs)):
+        a, b, q, left = pairs[p, 0], pairs[p, 1], pairs[p, 2], 0.0
+        for k in range(kinds.shape[1]):
             way, wide, size = 0.0, 0.0, 0.0
             for i in range(2):
                 way += 0.5 * swept.ways[rows[p, i], k]
@@ -96,42 +95,44 @@ def sort_out(
                 size += (swept.centers[rows[p, i], k, 3] + 2.0 * swept.rounding[rows[p, i], k]) / POSE_ROUNDING
                 wide += 16.0 * swept.rounding[rows[p, 2 + i], k]
             error = 32.0 * POSE_ROUNDING * size
-            gap = center_gap(volumes, swept.centers, pairs[p], rows[p], k) - error
+            if center_gap(volumes, swept.centers, pairs[p], rows[p], k) - error > max(cap + way, wide) * _ABOVE:
+                kinds[p, k], left = FAR, 0.0
+                continue
             kinds[p, k] = NEAR
-            if gap > max(cap + way, wide) * _ABOVE:
-                kinds[p, k] = FAR
-            elif 0.0 < limit < np.inf and volumes.kind != AABB:
-                pose = middle[q, k]
-                margin = 2.0**-43 * size
-                root = root_gap(bodies, a, b, pose, size, rotation, translation)
-                quiet = root - limit - margin > root_ratio(bodies, volumes, a, b) * (way + error)
-                quiet = quiet and 2.0 * proven_distance(limit, size) > (way + error) * _ABOVE
-                if quiet and boxes_gap(volumes, a, b, pose, rotation, scratch) > way + error + margin:
+            if 0.0 < limit < np.inf and volumes.kind != AABB:
+                error += 2.0**-43 * size
+                left -= way + error  # from the end of the stretch before to the middle
+                if not left > way + error:
+                    root = root_gap(bodies, a, b, middle[q, k], size, rotation, translation) - limit
+                    left = root / root_ratio(bodies, volumes, a, b)
+                    if left > way + error:
+                        left = min(left, boxes_gap(volumes, a, b, middle[q, k], rotation, scratch))
+                left -= way + error
+                if left > 0.0 and 2.0 * proven_distance(limit, size) > (way + error) * _ABOVE:
                     kinds[p, k] = QUIET
-            if kinds[p, k] == NEAR:
-                for f in range(begin, end + 1):
-                    wanted[q, f] = True
+                    continue
+            begin, _, end = stretch(k, intervals)
+            for f in range(begin, end + 1):
+                wanted[q, f] = True
 
 
 @leaf_kernel
 def least_apart(
-    volumes: Volumes,
-    centers: Floats,
-    pair: Integers,
-    rows: Integers,
-    interval: int,
-    found: tuple[float, float],
-    way: float,
-    rounding: float,
-    limit: float,
+    found: tuple[float, float], gaps: tuple[float, float], way: float, rounding: float, limit: float
 ) -> float:
-    """Return the least distance [m] that a pair can have in an interval, by the clearances found at its ends or NaN."""
+    """Return the least distance [m] that a pair can have in an interval.
+
+    Args:
+        found: clearances at its ends [m], or NaN.
+        gaps: of the spheres there [m], of no interest where a clearance was found.
+        way, rounding: of the bodies in the interval [m].
+        limit: up to which clearances were looked for [m].
+    """
     nearest = -way - (2.0 * rounding if way > 0.0 else 0.0)
     size = rounding / POSE_ROUNDING  # no less than the bodies' reach and offset
     for end in range(2):
         if math.isnan(found[end]):
-            gap = center_gap(volumes, centers, pair, rows, interval + end)
-            nearest += max(proven_distance(limit, size), gap, 0.0)
+            nearest += max(proven_distance(limit, size), gaps[end], 0.0)
         else:
             nearest += max(proven_distance(found[end], size), 0.0)
     return 0.5 * nearest
@@ -222,9 +223,11 @@ def certify(
                 certify_near(volumes, frames, place[p], rows[p], begin, end, limit, cap, told, p, counts, ways, scratch)
             elif kinds[p, k] == QUIET:
                 a, b = rows[p, 0], rows[p, 1]
+                after = center_gap(volumes, ways.centers, pairs[p], rows[p], 0)
                 for f in range(end - begin):
+                    before, after = after, center_gap(volumes, ways.centers, pairs[p], rows[p], f + 1)
                     way, rounded = ways.ways[a, f] + ways.ways[b, f], ways.rounding[a, f] + ways.rounding[b, f]
-                    least = least_apart(volumes, ways.centers, pairs[p], rows[p], f, nothing, way, rounded, limit)
+                    least = least_apart(nothing, (before, after), way, rounded, limit)
                     told.bound[told.begin + begin + f, told.columns[p]] = min(least, cap)
 
 
@@ -264,7 +267,11 @@ def certify_near(
                 doubt |= CONTACT_DOUBT
         else:
             found = (frames.clearance[f, p], frames.clearance[f + 1, p])
-            least = least_apart(volumes, ways.centers, frames.pairs[p], rows, f - begin, found, way, rounded, limit)
+            gaps = (
+                center_gap(volumes, ways.centers, frames.pairs[p], rows, f - begin),
+                center_gap(volumes, ways.centers, frames.pairs[p], rows, f + 1 - begin),
+            )
+            least = least_apart(found, gaps, way, rounded, limit)
             if not least > 0.0 and way > 0.0:
                 doubt |= CONTACT_DOUBT
             bound = min(max(least, 0.0), cap)

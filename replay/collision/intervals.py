@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -83,22 +83,17 @@ class Sorted:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """Where answers are written.
-
-    Attributes:
-        between, bound: (n, P) as the columns; rows are intervals from `begin` on.
-        begin: 0, or 1 where there is no interval before the first frame.
-        columns: (c,) of the pairs at hand.
-    """
+    """Columns between, bound (n, P) that answers are written to: rows are intervals from `begin` on."""
 
     between: Bytes
     bound: Floats
     begin: int
-    columns: Integers
 
-    def of(self, columns: Integers) -> Told:
-        """Return the same for other pairs."""
-        return replace(self, columns=columns)
+    @staticmethod
+    def clear(frames: int, pairs: int, cap: float) -> Told:
+        """Return those of pairs that are clear, and farther apart than the largest bound that is told."""
+        shape = frames, pairs
+        return Told(np.full(shape, Between.CLEAR, dtype=np.uint8), np.full(shape, cap), 0)
 
 
 class Intervals:
@@ -170,12 +165,6 @@ class Intervals:
         )
         return Course(time, first, local, travel, middle, share, swept)
 
-    def clear(self, shape: tuple[int, int], begin: int) -> Told:
-        """Return columns (n, P) of pairs that are clear, and farther apart than the largest bound that is told."""
-        between, bound = np.zeros(shape, dtype=np.uint8), np.full(shape, self._cap)
-        between[:begin], bound[:begin] = Between.NOT_LOOKED, np.nan
-        return Told(between, bound, begin, np.arange(shape[1]))
-
     def half_steps(self, course: Course) -> Floats:
         """Return half of how far each body moves between two frames at most, seen from the world (B,) [m]."""
         world = self._first[:-1]
@@ -223,13 +212,14 @@ class Intervals:
         )
         return Sorted(pairs, rows, kinds, wanted, course)
 
-    def answer(self, frames: PairFrames, found: Sorted, told: Told) -> Crossings:
+    def answer(self, frames: PairFrames, found: Sorted, columns: Integers, told: Told) -> Crossings:
         """Tell what is known of pairs in a block, and return what crossed.
 
         Args:
             frames: the NEAR ones of them, decided in all frames.
             found: see there.
-            told: columns of the pairs, written to.
+            columns: of the pairs.
+            told: written to.
         """
         if not found.kinds.any():  # all FAR
             return Crossings.none()
@@ -252,7 +242,7 @@ class Intervals:
             frames,
             self._limit,
             self._cap,
-            Answers(told.columns, told.between, told.bound, told.begin, doubt),
+            Answers(columns, told.between, told.bound, told.begin, doubt),
             counts,
             self._ways,
             np.empty(len(self._links), dtype=np.int64),
@@ -260,12 +250,12 @@ class Intervals:
         )
         crossings = Crossings.none()
         if doubt.any():
-            crossings = self._search(frames, course, found.near, doubt, told, searched)
+            crossings = self._search(frames, course, columns[found.near], doubt, told, searched)
         self._counters.add_intervals(counts.tolist(), searched.tolist())
         return crossings
 
     def _search(
-        self, frames: PairFrames, course: Course, near: Integers, doubt: Bytes, told: Told, counts: Integers
+        self, frames: PairFrames, course: Course, columns: Integers, doubt: Bytes, told: Told, counts: Integers
     ) -> Crossings:
         f, p = np.nonzero(doubt)
         bodies = frames.pairs[p, :2]
@@ -277,7 +267,7 @@ class Intervals:
             level=np.ascontiguousarray(np.stack([frames.level[f, p], frames.level[f + 1, p]], axis=1)),
             doubt=doubt[f, p],
         )
-        cells = f + told.begin, told.columns[near[p]]
+        cells = f + told.begin, columns[p]
         found, least = told.between[cells], told.bound[cells]
         events = np.empty((4 * len(f), 5), dtype=np.int64)
         count = crossing_search.search(
@@ -297,7 +287,7 @@ class Intervals:
         told.between[cells], told.bound[cells] = found, least
         question, level_, begins, earliest, latest = events[:count].T
         return Crossings(
-            pair=told.columns[near[p[question]]],
+            pair=columns[p[question]],
             level=level_.astype(np.uint8),
             begins=begins == 1,
             earliest=earliest,
@@ -307,19 +297,19 @@ class Intervals:
 
     def _chains(self, links: Integers) -> tuple[Chains, Integers]:
         """Return the ways between pairs of links, and (k, 2) each pair's: the short and the wide one."""
-        known, place = np.unique(links, axis=0, return_inverse=True)
+        asked = [(a, b) for a, b in links.tolist()]
+        known = {pair: k for k, pair in enumerate(dict.fromkeys(asked))}
         sides: list[list[int]] = []
-        for a, b in known.tolist():
+        for a, b in known:
             shared = self._shared(a, b)
             sides += [self._paths[a][shared:], self._paths[b][shared:]]
-        count = len(known)
         if self._volumes.kind == AABB:
-            for a, b in known.tolist():
+            for a, b in known:
                 sides += [self._paths[a], self._paths[b]]
         first = np.concatenate([[0], np.cumsum([len(side) for side in sides])]).astype(np.int64)
         chains = Chains(first, np.array([link for side in sides for link in side], dtype=np.int64))
-        near = place.reshape(-1)
-        return chains, np.stack([near, near + count if self._volumes.kind == AABB else near], axis=1).astype(np.int64)
+        near = np.array([known[pair] for pair in asked], dtype=np.int64)
+        return chains, np.stack([near, near + len(known) if self._volumes.kind == AABB else near], axis=1)
 
     def _shared(self, a: int, b: int) -> int:
         """Return how many links the paths from their roots to two links have in common."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -99,7 +99,7 @@ class CollisionPipeline:
         self._links = np.array([body.link for body in chosen], dtype=np.int64)
         self._place = np.full(len(bodies), -1, dtype=np.int64)
         self._place[self._used] = np.arange(len(chosen))
-        self._static: list[_Found] | None = None
+        self._rest: _Rest | None = None
         # between frames distances are our own, whatever decides at the frames
         self._own: NarrowPhase | None = None
         self._cap = math.inf if clearance == "always" else float(margin)
@@ -166,34 +166,32 @@ class CollisionPipeline:
         """
         if isinstance(self._pairs, Ruled):
             raise InvalidValue("pairs", "rules", "columns need listed pairs; ask `contacts` instead")
-        shape = (len(poses.local) - lead, self._pairs.count)
-        columns = CollisionColumns(
-            level=np.zeros(shape, dtype=np.uint8),
-            clearance=np.full(shape, np.nan),
-            evaluated=np.zeros(shape, dtype=bool),
-            undecided=np.zeros(shape, dtype=bool),
-            between=np.broadcast_to(np.uint8(Between.NOT_LOOKED), shape),
-            clearance_bound=np.broadcast_to(np.nan, shape),
-        )
+        n = len(poses.local) - lead
+        self._check(poses)
         course = told = None
-        if self._intervals is not None and time is not None and len(time) > 1:
+        rest = self._at_rest(poses)
+        level, clearance = np.repeat(rest.level, n, axis=0), np.repeat(rest.clearance, n, axis=0)
+        evaluated, undecided = np.repeat(rest.evaluated, n, axis=0), np.repeat(rest.undecided, n, axis=0)
+        if self._intervals is None or time is None or len(time) < 2:
+            between = np.broadcast_to(np.uint8(Between.NOT_LOOKED), level.shape)
+            bound = np.broadcast_to(np.nan, level.shape)
+        else:
             course = self._intervals.course(poses, lead, time, first)
-            told = self._intervals.clear(shape, 1 - lead)
-            self.counters.intervals += (len(time) - 1) * shape[1]
-            columns = replace(columns, between=told.between, clearance_bound=told.bound)
+            between, bound = np.repeat(rest.between, n, axis=0), np.repeat(rest.bound, n, axis=0)
+            between[: 1 - lead], bound[: 1 - lead] = Between.NOT_LOOKED, np.nan
+            told = Told(between, bound, 1 - lead)
+            self.counters.intervals += (len(time) - 1) * self._pairs.count
         crossings = []
-        for found in self._evaluate(poses, lead, course, told):
+        for found in self._moving(poses, lead, course, told):
             if len(found.columns):
-                columns.level[:, found.columns] = found.level
-                columns.clearance[:, found.columns] = found.clearance
-                columns.evaluated[:, found.columns] = ~np.isnan(found.clearance)
-                columns.undecided[:, found.columns] = found.undecided
-            if told is not None and found.still is not None:
-                fixed = found.still.columns
-                told.between[told.begin :, fixed] = found.still.between[:, fixed]
-                told.bound[told.begin :, fixed] = found.still.bound[:, fixed]
+                level[:, found.columns] = found.level
+                clearance[:, found.columns] = found.clearance
+                evaluated[:, found.columns] = ~np.isnan(found.clearance)
+                undecided[:, found.columns] = found.undecided
             crossings.append(found.crossings)
-        return replace(columns, crossings=Crossings.joined(crossings))
+        return CollisionColumns(
+            level, clearance, evaluated, undecided, between, bound, crossings=Crossings.joined(crossings)
+        )
 
     def contacts(self, poses: LinkPoses) -> CollisionEntries:
         """Return what `run` does without the clear pairs and frames: memory and time grow with those that are near.
@@ -204,10 +202,11 @@ class CollisionPipeline:
         Accuracy: as `run`.
         """
         n = len(poses.local)
+        self._check(poses)
         frame, bodies = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)]
         level, clearance = [np.zeros(0, dtype=np.uint8)], [np.zeros(0)]
         undecided = [np.zeros(0, dtype=bool)]
-        for found in self._evaluate(poses, 0, None, None):
+        for found in (*self._at_rest(poses).found, *self._moving(poses, 0, None, None)):
             asked = (n, len(found.columns))
             f, p = np.nonzero(np.broadcast_to((found.level > 0) | ~np.isnan(found.clearance), asked))
             source = np.minimum(f, len(found.level) - 1)
@@ -226,20 +225,19 @@ class CollisionPipeline:
             undecided=np.concatenate(undecided)[order],
         )
 
-    def _evaluate(self, poses: LinkPoses, lead: int, course: Course | None, told: Told | None) -> Iterator[_Found]:
-        """Yield what is known of all pairs that may be near in a block, of those that cannot move as one frame."""
-        n = len(poses.local) - lead
+    def _check(self, poses: LinkPoses) -> None:
         if not np.isfinite(poses.local).all():
             frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
             place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
             raise InvalidValue(place, poses.local[frame, link].tolist(), "link poses must be finite")
+
+    def _moving(self, poses: LinkPoses, lead: int, course: Course | None, told: Told | None) -> Iterator[_Found]:
+        """Yield what is known in a block of all pairs that can move and may be near; tell what is of its intervals."""
+        n = len(poses.local) - lead
         self.counters.pair_frames += n * self._pairs.count
+        self.counters.static += n * self._pairs.static_count
         if n == 0 or self._pairs.count == 0:
             return
-        if self._static is None:
-            self._static = list(self._still(poses.slice(0, 1))) if self._pairs.static_count else []
-        self.counters.static += n * self._pairs.static_count
-        yield from self._static
         if self._all is None:
             moving = self._candidates(poses, course).moving()
             self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
@@ -254,21 +252,23 @@ class CollisionPipeline:
             reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _still(self, one: LinkPoses) -> Iterator[_Found]:
-        """Yield what is found of pairs that cannot move, in one frame and in an interval between two such frames."""
-        course = told = None
-        if self._intervals is not None:
-            one = one.joined([one, one])
-            course = self._intervals.still(one)
-        fixed = self._candidates(one, course).fixed()
-        self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
-        for batch in self._batches(fixed):
+    def _at_rest(self, poses: LinkPoses) -> _Rest:
+        """Return what is known of pairs that cannot move, by one frame of the first block that has any."""
+        if self._rest is not None:
+            return self._rest
+        told, found, course = Told.clear(1, self._pairs.count, self._cap), [], None
+        if len(poses.local) and self._pairs.static_count:
+            one, lead = poses.slice(0, 1), 0
             if self._intervals is not None:
-                told = self._intervals.clear((1, self._pairs.count), 0)
-            found = self._work(batch, one, len(one.local) - 1, course, told)
-            if told is not None:
-                found = replace(found, still=told.of(batch.columns))
-            yield found
+                one, lead = one.joined([one, one]), 1
+                course = self._intervals.still(one)
+            fixed = self._candidates(one, course).fixed()
+            self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
+            found = [self._work(batch, one, lead, course, told) for batch in self._batches(fixed)]
+        rest = _Rest.of(told, found)
+        if len(poses.local):
+            self._rest = rest
+        return rest
 
     def _work(self, batch: Batch, poses: LinkPoses, lead: int, course: Course | None, told: Told | None) -> _Found:
         """Return what is found of a batch's pairs in a block, and tell what is known of its intervals."""
@@ -283,7 +283,7 @@ class CollisionPipeline:
         known = frames
         if self._own is not None:
             known = frames._replace(clearance=self._frames.decide(self._own, batch, rows, poses).clearance)
-        crossings = self._intervals.answer(known, found, told.of(batch.columns))
+        crossings = self._intervals.answer(known, found, batch.columns, told)
         return _Found(batch.columns[found.near], frames, lead, crossings)
 
     def _batches(self, chosen: Selected) -> list[Batch]:
@@ -297,15 +297,13 @@ class CollisionPipeline:
 class _Found:
     """Results of pairs of a batch, which are these c columns; the others are clear in all frames, without clearances.
 
-    `frames` holds them in all frames after `lead` ones, in one frame of pairs that cannot move; `still` is what is told
-    of an interval of those.
+    `frames` holds them in all frames after `lead` ones.
     """
 
     columns: Integers
     frames: PairFrames
     lead: int
     crossings: Crossings
-    still: Told | None = None
 
     @property
     def level(self) -> Bytes:
@@ -318,3 +316,26 @@ class _Found:
     @property
     def undecided(self) -> Flags:
         return self.frames.undecided[self.lead :]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """What is found of pairs that cannot move in one frame, and (1, P) columns in which all others are clear."""
+
+    found: list[_Found]
+    level: Bytes
+    clearance: Floats
+    evaluated: Flags
+    undecided: Flags
+    between: Bytes
+    bound: Floats
+
+    @staticmethod
+    def of(told: Told, found: list[_Found]) -> _Rest:
+        shape = told.between.shape
+        level, clearance = np.zeros(shape, dtype=np.uint8), np.full(shape, np.nan)
+        undecided = np.zeros(shape, dtype=bool)
+        for each in found:
+            level[:, each.columns], clearance[:, each.columns] = each.level, each.clearance
+            undecided[:, each.columns] = each.undecided
+        return _Rest(found, level, clearance, ~np.isnan(clearance), undecided, told.between, told.bound)

@@ -14,6 +14,8 @@ from replay.kinematics.timeline import compose
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
+_IDENTITY = np.identity(4)
+
 
 class RelativePoses:
     """Link pairs (Q, 2) of a linkage, and which ways their relative poses are made of.
@@ -57,20 +59,20 @@ class RelativePoses:
         """How many link pairs there are."""
         return len(self._pairs)
 
-    def of(self, local: Floats, wanted: Flags | None = None) -> Floats:
-        """Return T_a_b (Q, n, 4, 4) of the Q link pairs.
+    def of(self, local: Floats, chosen: Integers | None = None, wanted: Flags | None = None) -> Floats:
+        """Return T_a_b (Q, n, 4, 4) of link pairs.
 
         Args:
             local: (n, L, 4, 4) link poses in their parents.
-            wanted: (Q, n) the link pairs and frames that are asked for, all if None; what is returned of others means
-                nothing.
+            chosen: (Q,) which link pairs, all if None.
+            wanted: (Q, n) in which frames, in all if None; what is returned of others means nothing.
         """
-        n = len(local)
-        wanted = np.ones((len(self._pairs), n), dtype=bool) if wanted is None else wanted
-        table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(self._pairs), n, 4, 4))
+        n, pairs = len(local), self._pairs if chosen is None else self._pairs[chosen]
+        wanted = np.ones((len(pairs), n), dtype=bool) if wanted is None else wanted
+        table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(pairs), n, 4, 4))
         needed = np.zeros((len(self._ways), n), dtype=bool)
-        local, one = np.ascontiguousarray(local), np.identity(4)
-        _relative(local, self._ways, self._pairs, needed, wanted, table, one, one.copy(), result)
+        local = np.ascontiguousarray(local)
+        _relative(local, self._ways, pairs, needed, wanted, table, _IDENTITY, _IDENTITY.copy(), result)
         return result
 
 
