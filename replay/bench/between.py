@@ -50,7 +50,7 @@ def run(*, quick: bool = False) -> Report:
         quick: fewer frames and contacts; some ten seconds.
     """
     report = Report("between")
-    _scenes(report, blocks=1 if quick else 8, rounds=2 if quick else 5)
+    _scenes(report, blocks=1 if quick else 8, rounds=2 if quick else 9)
     report.grids[TIMES] = _times(report, 20 if quick else 500)
     report.grids[PEERS] = _peers(20 if quick else 200)
     return report
