@@ -134,7 +134,7 @@ def measure_travel(line: Timeline, n: int, t0: float, t1: float, s: Scratch) -> 
             free_travel(line, line.joint[link], t0, t1, s.found)
             s.travel[i] = s.found[TURN if s.kind[i] == BALL else SHIFT]
         else:
-            joint_travel(line, line.joint[link], t0, t1, s.variation, s.found)
+            joint_travel(line, line.joint[link], t0, t1, s.variation, s.found, False)
             s.travel[i] = s.found[TRAVEL]
 
 
