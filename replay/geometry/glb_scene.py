@@ -45,6 +45,7 @@ class Accessor(_GlbEntry):
     count: Annotated[int, Field(ge=1, lt=1 << 53)]
     bufferView: _Index | None = None
     byteOffset: _Size = 0
+    normalized: bool = False
     sparse: dict[str, Any] | None = None
 
 
