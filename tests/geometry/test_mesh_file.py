@@ -153,6 +153,8 @@ def doubled(scene):
         (set_in("nodes", 0, "children", value=[0]), "a node is within itself"),
         (set_in("nodes", 0, "scale", value=[1, float("nan"), 1]), "node 0 has a transform that is not finite"),
         (doubled, "has two parents"),
+        (set_in("scenes", 0, "nodes", value=[99]), "a scene begins with a node that is not there"),
+        (set_in("scene", value=9), "its scene is not there"),
     ],
 )
 def test_glb_that_would_be_read_in_part_or_fill_the_memory_is_refused(change, words):
