@@ -96,6 +96,10 @@ class FieldSolver:
             waiting = np.concatenate([first[~small], first[~small] + 1])
         return np.concatenate(done)
 
+    def solve(self, placement: PosedBodies, count: int) -> BemReading | None:
+        """Return what bodies change in one pose by so many nodes, and by half of them; None as of `read`."""
+        return self._read(placement, count)
+
     def read(self, placement: PosedBodies) -> BemReading | None:
         """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer."""
         found = self._read(placement, _NODES)
