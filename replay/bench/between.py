@@ -50,7 +50,7 @@ def run(*, quick: bool = False) -> Report:
         quick: fewer frames and contacts; some ten seconds.
     """
     report = Report("between")
-    _scenes(report, blocks=1 if quick else 8, rounds=2 if quick else 5)
+    _scenes(report, blocks=1 if quick else 8, rounds=2 if quick else 9)
     report.grids[TIMES] = _times(report, 20 if quick else 500)
     report.grids[PEERS] = _peers(20 if quick else 200)
     return report
@@ -84,7 +84,7 @@ def _scene(
     engines = {True: collision_pipeline(scene, motion), False: collision_pipeline(scene, None)}
     seconds = dict.fromkeys(engines, math.inf)
     for _ in range(rounds):
-        spent, found = dict.fromkeys(engines, 0.0), []
+        spent, counts, frames = dict.fromkeys(engines, 0.0), np.zeros(len(Between), dtype=np.int64), 0
         for first in range(0, min(scene.frames, blocks * BLOCK_FRAMES), BLOCK_FRAMES):
             lead = min(first, 1)
             ns = scene.time_ns(first - lead, min(first + BLOCK_FRAMES, scene.frames))
@@ -96,11 +96,9 @@ def _scene(
                 columns[looks] = engine.run(shown, lead=lead, time=ns, first=first) if looks else engine.run(shown)
                 spent[looks] += time.process_time() - begin
             _check_frames(columns[True], columns[False])
-            found.append(columns[True])
+            counts += np.bincount(columns[True].between.ravel(), minlength=len(Between))  # type: ignore[union-attr]
+            frames += len(columns[True].level)
         seconds = {looks: min(seconds[looks], spent[looks]) for looks in engines}
-    states = np.concatenate([columns.between.ravel() for columns in found])  # type: ignore[union-attr]
-    counts = np.bincount(states, minlength=len(Between))
-    frames = sum(len(columns.level) for columns in found)
     asked, unknown = int(counts[:3].sum()), int(counts[Between.UNDECIDED])
     proven, sampled = engines[True].counters, engines[False].counters
     ratio = seconds[False] / max(seconds[True], 1e-9)

@@ -11,7 +11,7 @@ from replay.collision import broad, narrow, way_sieve
 from replay.collision.bodies import Bodies, Volumes
 from replay.collision.counters import Counters
 from replay.collision.engines import NarrowPhase
-from replay.collision.intervals import Course, Intervals
+from replay.collision.intervals import Intervals, Sorted
 from replay.collision.pair_frames import PairFrames, unanswered
 from replay.collision.relative import RelativePoses
 from replay.kinematics.linkage import Linkage, LinkPoses
@@ -103,28 +103,40 @@ class FrameDecider:
         batch: Batch,
         rows: Integers,
         poses: LinkPoses,
-        ways: Integers | None = None,
-        course: Course | None = None,
+        found: Sorted | None = None,
     ) -> PairFrames:
-        """Return what an engine finds of some of a batch's pairs in frames; by their ways if the course is known."""
-        wanted = np.zeros(batch.relative.count, dtype=bool)
-        wanted[rows[:, 2]] = True
-        relative = batch.relative.of(poses.local, wanted)
+        """Return what an engine finds of pairs (P, 4) of a batch in frames.
+
+        Args:
+            engine, batch, rows, poses: see above.
+            found: if it is known the pairs are those that are NEAR, and may be left out elsewhere.
+        """
+        if len(rows) == 0:
+            return unanswered(rows, np.empty((0, len(poses.local), 4, 4)), np.zeros((1, 1, 3, 3)))
+        by_ways = found if self.savings and self.by_ways else None
+        chosen = wanted = None
+        if found is not None:
+            chosen, place = np.unique(rows[:, 2], return_inverse=True)
+            rows = rows.copy()
+            rows[:, 2] = place
+        if by_ways is not None:
+            wanted = by_ways.wanted[chosen]
+        relative = batch.relative.of(poses.local, chosen, wanted)
         turns = np.zeros((1, len(poses.local), 3, 3))  # read for boxes along the world's axes only
         if self.turning:
             turns = np.ascontiguousarray(np.moveaxis(poses.world[:, batch.bases, :3, :3], 1, 0))
         frames = unanswered(rows, relative, turns)
         sieved, decided = np.zeros(broad.COUNTS, dtype=np.int64), np.zeros(narrow.COUNTS, dtype=np.int64)
         scratch, limit = np.zeros((8, 4)), self.limit
-        if self.savings and self.by_ways and ways is not None and course is not None:
+        if by_ways is not None:
             way_sieve.sieve_by_way(
                 self.bodies,
                 self.volumes,
                 frames,
-                course.begin,
-                ways,
-                course.ways,
-                course.largest_rounding,
+                by_ways.kinds[by_ways.near],
+                by_ways.rows[by_ways.near],
+                by_ways.course.steps,
+                by_ways.course.swept.rounding,
                 limit,
                 sieved,
                 scratch,

@@ -76,6 +76,7 @@ class Crossings:
     @staticmethod
     def joined(parts: Sequence[Crossings]) -> Crossings:
         """Return the entries of several as one; at one moment, higher levels begin last and end first."""
+        parts = [part for part in parts if len(part.pair)]
         if not parts:
             return Crossings.none()
         names = [item.name for item in fields(Crossings)]

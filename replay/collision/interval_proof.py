@@ -9,9 +9,10 @@ that does not do, the gap of the boxes. None of it depends on other frames.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, uint8
+from numba import boolean, float64, int64, uint8
 
 from replay.collision.bodies import AABB, BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import volumes_meet
@@ -19,10 +20,11 @@ from replay.collision.crossing_look import BOUNDS_DOUBT, CONTACT_DOUBT, proven_d
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.volume_gap import boxes_gap
 from replay.collision.way_sieve import root_gap, root_ratio
-from replay.collision.ways import center_gap
+from replay.collision.ways import FAR, NEAR, QUIET, WAYS_TYPE, Ways, center_gap, fill_ways, stretch
 from replay.kinematics.linkage import POSE_ROUNDING
-from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel
+from replay.kinematics.timeline import TIMELINE_TYPE, Timeline
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel, record
 
 COUNTS = 2
 BY_FRAMES, IN_DOUBT = range(COUNTS)
@@ -31,25 +33,22 @@ BY_FRAMES, IN_DOUBT = range(COUNTS)
 CLEAR, CONTACT, UNDECIDED = 0, 1, 2
 """As `columns.Between`."""
 
-FAR, QUIET, NEAR = range(3)
-"""What a block may hold of a pair: the largest bound in all intervals; nothing within the limit in any frame, and all
-intervals proven by that; or more."""
+_ABOVE = 1.0 + 2.0**-30
+"""Above what is rounded of the ways in a stretch."""
 
 
 @entry(
     BODIES_TYPE,
     VOLUMES_TYPE,
-    float64[:, :, ::1],
     int64[:, ::1],
     float64[:, :, :, ::1],
     int64[:, ::1],
-    float64[::1],
-    float64[::1],
-    float64[::1],
-    float64[::1],
+    WAYS_TYPE,
+    int64,
     float64,
     float64,
-    uint8[::1],
+    uint8[:, ::1],
+    boolean[:, ::1],
     float64[:, ::1],
     float64[:, ::1],
     float64[::1],
@@ -58,220 +57,247 @@ intervals proven by that; or more."""
 def sort_out(
     bodies: Bodies,
     volumes: Volumes,
-    centers: Floats,
     pairs: Integers,
     middle: Floats,
     rows: Integers,
-    half: Floats,
-    longest: Floats,
-    rounding: Floats,
-    blur: Floats,
+    swept: Ways,
+    intervals: int,
     limit: float,
     cap: float,
     kinds: Bytes,
+    wanted: Flags,
     scratch: Floats,
     rotation: Floats,
     translation: Floats,
 ) -> None:
-    """Find out which pairs a block need not be looked at for, by its middle frame and the ways of its bodies.
+    """Find out which pairs a stretch need not be looked at for, by its middle frame and all that moves in it.
 
     Args:
         bodies, volumes: of the scene.
-        centers: as of `certify`.
         pairs: (P, 4) as `PairFrames.pairs`.
-        middle: (Q, 1, 4, 4) T_a_b of the links in the middle frame.
+        middle: (Q, K, 4, 4) T_a_b of the links in the middle frames of the K stretches.
         rows: (P, 4) as of `certify`.
-        half: (V,) sum of each way from the middle frame to either end of the block, the larger one [m].
-        longest: (V,) each way in the interval in which it is longest [m].
-        rounding, blur: (V,) the largest of each row of `ways.fill_ways`, and the largest rounding of its centres [m].
-        limit, cap: as of `certify`.
-        kinds: (P,) out, FAR, QUIET or NEAR.
+        swept: of the stretches, see `ways.fill_stretches`.
+        intervals: of the block.
+        limit, cap: as of `certify`; with a limit of 0 no pair is QUIET.
+        kinds: (P, K) out, FAR, QUIET or NEAR.
+        wanted: (Q, n) link pairs and frames, set where a pair of theirs is NEAR.
         scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
     """
-    m = centers.shape[1] // 2
     for p in range(len(pairs)):
-        a, b, pose = pairs[p, 0], pairs[p, 1], middle[pairs[p, 2], 0]
-        way, wide, step = 0.0, 0.0, 0.0
-        for k in range(2):
-            way += half[rows[p, k]] + 2.0 * rounding[rows[p, k]]
-            wide += half[rows[p, 2 + k]] + 2.0 * rounding[rows[p, 2 + k]]
-            step += longest[rows[p, k]] + 2.0 * rounding[rows[p, k]]
-        kinds[p] = NEAR
-        # the gap is rounded here and in each frame
-        gap = center_gap(volumes, centers, pairs[p], rows[p], m) - 4.0 * (blur[rows[p, 0]] + blur[rows[p, 1]])
-        if gap > max(cap + way, wide) * (1.0 + 2.0**-40):
-            kinds[p] = FAR
-        elif 0.0 < limit < np.inf and volumes.kind != AABB:
-            size = (rounding[rows[p, 0]] + rounding[rows[p, 1]]) / POSE_ROUNDING
-            margin = 2.0**-43 * size
-            root = root_gap(bodies, a, b, pose, size, rotation, translation)
-            quiet = root - limit - margin > root_ratio(bodies, volumes, a, b) * way
-            quiet = quiet and 2.0 * proven_distance(limit, size) > step * (1.0 + 2.0**-40)
-            if quiet and boxes_gap(volumes, a, b, pose, rotation, scratch) > way + margin:
-                kinds[p] = QUIET
+        a, b, q, left = pairs[p, 0], pairs[p, 1], pairs[p, 2], 0.0
+        for k in range(kinds.shape[1]):
+            way, wide, size = 0.0, 0.0, 0.0
+            for i in range(2):
+                way += 0.5 * swept.ways[rows[p, i], k]
+                wide += 0.5 * swept.ways[rows[p, 2 + i], k]
+                # no coordinate of the frames is larger
+                size += (swept.centers[rows[p, i], k, 3] + 2.0 * swept.rounding[rows[p, i], k]) / POSE_ROUNDING
+                wide += 16.0 * swept.rounding[rows[p, 2 + i], k]
+            error = 32.0 * POSE_ROUNDING * size
+            if center_gap(volumes, swept.centers, pairs[p], rows[p], k) - error > max(cap + way, wide) * _ABOVE:
+                kinds[p, k], left = FAR, 0.0
+                continue
+            kinds[p, k] = NEAR
+            if 0.0 < limit < np.inf and volumes.kind != AABB:
+                error += 2.0**-43 * size
+                left -= way + error  # from the end of the stretch before to the middle
+                if not left > way + error:
+                    root = root_gap(bodies, a, b, middle[q, k], size, rotation, translation) - limit
+                    left = root / root_ratio(bodies, volumes, a, b)
+                    if left > way + error:
+                        left = min(left, boxes_gap(volumes, a, b, middle[q, k], rotation, scratch))
+                left -= way + error
+                if left > 0.0 and 2.0 * proven_distance(limit, size) > (way + error) * _ABOVE:
+                    kinds[p, k] = QUIET
+                    continue
+            begin, _, end = stretch(k, intervals)
+            for f in range(begin, end + 1):
+                wanted[q, f] = True
 
 
-@leaf_kernel
+@inlined_kernel
 def least_apart(
-    volumes: Volumes,
-    centers: Floats,
-    pair: Integers,
-    rows: Integers,
-    interval: int,
-    found: tuple[float, float],
-    way: float,
-    rounding: float,
-    limit: float,
+    found: tuple[float, float], gaps: tuple[float, float], way: float, rounding: float, limit: float
 ) -> float:
-    """Return the least distance [m] that a pair can have in an interval, by the clearances found at its ends or NaN."""
+    """Return the least distance [m] that a pair can have in an interval.
+
+    Args:
+        found: clearances at its ends [m], or NaN.
+        gaps: of the spheres there [m], of no interest where a clearance was found.
+        way, rounding: of the bodies in the interval [m].
+        limit: up to which clearances were looked for [m].
+    """
     nearest = -way - (2.0 * rounding if way > 0.0 else 0.0)
     size = rounding / POSE_ROUNDING  # no less than the bodies' reach and offset
     for end in range(2):
         if math.isnan(found[end]):
-            gap = center_gap(volumes, centers, pair, rows, interval + end)
-            nearest += max(proven_distance(limit, size), gap, 0.0)
+            nearest += max(proven_distance(limit, size), gaps[end], 0.0)
         else:
             nearest += max(proven_distance(found[end], size), 0.0)
     return 0.5 * nearest
 
 
-@entry(
-    VOLUMES_TYPE,
-    float64[:, :, ::1],
-    int64[:, ::1],
-    int64[:, ::1],
-    float64[:, ::1],
-    float64[:, ::1],
-    float64,
-    float64,
-    float64[:, ::1],
-)
-@leaf_kernel
-def fill_quiet(
-    volumes: Volumes,
-    centers: Floats,
-    pairs: Integers,
-    rows: Integers,
-    ways: Floats,
-    rounding: Floats,
-    limit: float,
-    cap: float,
-    bound: Floats,
-) -> None:
-    """Write the bounds (m, P) of QUIET pairs over the m intervals of a block; arguments as of `certify`."""
-    nothing = (np.nan, np.nan)
-    for p in range(len(pairs)):
-        a, b = rows[p, 0], rows[p, 1]
-        for f in range(len(bound)):
-            way, rounded = ways[a, f] + ways[b, f], rounding[a, f] + rounding[b, f]
-            bound[f, p] = min(least_apart(volumes, centers, pairs[p], rows[p], f, nothing, way, rounded, limit), cap)
+class Answers(NamedTuple):
+    """What is said of pairs over intervals, in the arrays that it is written to: rows are intervals."""
+
+    columns: Integers  # (P,) of each pair
+    between: Bytes  # (n, columns)
+    bound: Floats  # (n, columns) [m]; NaN, and `between` UNDECIDED, where there is doubt of a contact
+    begin: int  # row of the first interval
+    doubt: Bytes  # (m, p) bits of `crossing_look`, of the pairs in `PairFrames`; zero
+
+
+ANSWERS_TYPE = record(Answers, int64[::1], uint8[:, ::1], float64[:, ::1], int64, uint8[:, ::1])
 
 
 @entry(
+    TIMELINE_TYPE,
     VOLUMES_TYPE,
-    PAIR_FRAMES_TYPE,
-    PAIR_FRAMES_TYPE,
-    int64,
-    int64[:, ::1],
+    int64[::1],
+    float64[:, :, :, ::1],
     float64[:, :, ::1],
-    float64[:, ::1],
-    float64[:, ::1],
+    int64[::1],
+    int64[:, ::1],
+    int64[:, ::1],
+    uint8[:, ::1],
+    int64[::1],
+    PAIR_FRAMES_TYPE,
     float64,
     float64,
-    uint8[:, ::1],
-    float64[:, ::1],
-    uint8[:, ::1],
+    ANSWERS_TYPE,
+    int64[::1],
+    WAYS_TYPE,
     int64[::1],
     float64[:, ::1],
 )
 @leaf_kernel
 def certify(
+    line: Timeline,
     volumes: Volumes,
-    frames: PairFrames,
-    head: PairFrames,
-    begin: int,
+    links: Integers,
+    local: Floats,
+    travel: Floats,
+    first: Integers,
+    pairs: Integers,
     rows: Integers,
-    centers: Floats,
-    ways: Floats,
-    rounding: Floats,
+    kinds: Bytes,
+    place: Integers,
+    frames: PairFrames,
     limit: float,
     cap: float,
-    between: Bytes,
-    bound: Floats,
-    doubt: Bytes,
+    told: Answers,
     counts: Integers,
+    ways: Ways,
+    top: Integers,
     scratch: Floats,
 ) -> None:
-    """Fill in what is known of pairs over the intervals that end at the frames from `begin` on.
+    """Fill in what is known of pairs over the intervals of a block, but where they are FAR: there it stands already.
 
     Args:
-        volumes: of all bodies.
-        frames: of n frames, decided by the narrow phase.
-        head: of the frame before the first one, read if `begin` is 0.
-        begin: 0, or 1 if there is no frame before the first one.
+        line, volumes, links, local, travel, first: see `ways.fill_ways`; of m + 1 frames.
+        pairs: (P, 4) as `PairFrames.pairs`.
         rows: (P, 4) rows of `ways`: of both bodies as seen from the nearest common ancestor, and from the world.
-        centers, ways, rounding: see `ways.fill_ways`; column f - begin is of the interval that ends at frame f.
+        kinds: (P, K) of `sort_out`.
+        place: (P,) which of `frames.pairs` each is, -1 if it is NEAR nowhere.
+        frames: of all frames, decided by the narrow phase where pairs are NEAR.
         limit: up to which the narrow phase looked for distances [m].
         cap: largest bound that is told [m].
-        between, bound: (n, P) out; `bound` is NaN and `between` UNDECIDED where there is doubt of a contact.
-        doubt: (n, P) out, bits of `crossing_look`.
+        told: out.
         counts: (COUNTS,) added to.
-        scratch: (8, 4).
+        ways, top, scratch: of STRETCH intervals, (B,), (8, 4) scratch.
     """
-    n = frames.level.shape[0]
-    for p in range(len(frames.pairs)):
-        a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
-        way_a, way_b, wide_a, wide_b = rows[p, 0], rows[p, 1], rows[p, 2], rows[p, 3]
-        found1, level1, unsure1, left = 0.0, 0, False, 0.0
-        for f in range(begin - 1, n):
-            found0, level0, unsure0 = found1, level1, unsure1
-            if f < 0:
-                found1, level1, unsure1 = head.clearance[0, p], head.level[0, p], head.undecided[0, p]
-            else:
-                found1, level1, unsure1 = frames.clearance[f, p], frames.level[f, p], frames.undecided[f, p]
-            if f < begin:
-                continue
-            rounded, rounded_wide = 0.0, 0.0
-            for k in range(2):
-                rounded += rounding[rows[p, k], f - begin]
-                rounded_wide += rounding[rows[p, 2 + k], f - begin]
-            way = ways[way_a, f - begin] + ways[way_b, f - begin]
-            between[f, p], bound[f, p], doubt[f, p] = CLEAR, 0.0, 0
-            # the bodies
-            if level0 == 2 or level1 == 2:
-                proven = (level0 == 2 and not unsure0) or (level1 == 2 and not unsure1)
-                between[f, p] = CONTACT if proven else UNDECIDED
-                if level0 != level1 and (level0 < 2 or level1 < 2):
-                    doubt[f, p] |= CONTACT_DOUBT
-            else:
-                found = (found0, found1)
-                least = least_apart(volumes, centers, frames.pairs[p], rows[p], f - begin, found, way, rounded, limit)
-                if not least > 0.0 and way > 0.0:
-                    doubt[f, p] |= CONTACT_DOUBT
-                bound[f, p] = min(max(least, 0.0), cap)
-            # their volumes
-            wide = ways[wide_a, f - begin] + ways[wide_b, f - begin]
-            if wide > 0.0:
-                wide += 2.0 * rounded_wide
-            left -= wide
-            if (level0 == 0) != (level1 == 0):
-                doubt[f, p] |= BOUNDS_DOUBT
-            elif level0 == 0 and wide > 0.0 and (left <= 0.0 or doubt[f, p] & CONTACT_DOUBT):
-                boxes = 0.0
-                for k in range(2):
-                    at = head.poses[q, 0] if f + k == 0 else frames.poses[q, f + k - 1]
-                    turned = head.turns[turn, 0] if f + k == 0 else frames.turns[turn, f + k - 1]
-                    left = 0.0
-                    if not volumes_meet(volumes, a, b, at, turned, scratch):
-                        left = max(boxes_gap(volumes, a, b, at, turned, scratch), 0.0)
-                    boxes += left
-                if not boxes > wide:
-                    doubt[f, p] |= BOUNDS_DOUBT
-                elif doubt[f, p] & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
-                    doubt[f, p] = 0
-                    bound[f, p] = min(0.5 * (boxes - way) - rounded, cap)
-            if level1 > 0:
+    nothing = (np.nan, np.nan)
+    for k in range(kinds.shape[1]):
+        begin, _, end = stretch(k, travel.shape[1])
+        for body in range(len(links)):
+            top[body] = first[body + 1]
+        for p in range(len(pairs)):
+            if kinds[p, k] != FAR:
+                for i in range(4):
+                    body = pairs[p, i % 2]
+                    top[body] = min(top[body], rows[p, i])
+        fill_ways(line, volumes, links, local, travel, first, top, begin, end, ways)
+        for p in range(len(pairs)):
+            if kinds[p, k] == NEAR:
+                certify_near(volumes, frames, place[p], rows[p], begin, end, limit, cap, told, p, counts, ways, scratch)
+            elif kinds[p, k] == QUIET:
+                a, b = rows[p, 0], rows[p, 1]
+                after = center_gap(volumes, ways.centers, pairs[p], rows[p], 0)
+                for f in range(end - begin):
+                    before, after = after, center_gap(volumes, ways.centers, pairs[p], rows[p], f + 1)
+                    way, rounded = ways.ways[a, f] + ways.ways[b, f], ways.rounding[a, f] + ways.rounding[b, f]
+                    least = least_apart(nothing, (before, after), way, rounded, limit)
+                    told.bound[told.begin + begin + f, told.columns[p]] = min(least, cap)
+
+
+@leaf_kernel
+def certify_near(
+    volumes: Volumes,
+    frames: PairFrames,
+    p: int,
+    rows: Integers,
+    begin: int,
+    end: int,
+    limit: float,
+    cap: float,
+    told: Answers,
+    pair: int,
+    counts: Integers,
+    ways: Ways,
+    scratch: Floats,
+) -> None:
+    """Do what `certify` does for one pair, p of `frames` and `pair` of `told`, in a stretch in which it is NEAR."""
+    a, b, q, turn = frames.pairs[p, 0], frames.pairs[p, 1], frames.pairs[p, 2], frames.pairs[p, 3]
+    column, left = told.columns[pair], 0.0
+    for f in range(begin, end):
+        level0, level1 = frames.level[f, p], frames.level[f + 1, p]
+        rounded, rounded_wide, way, wide = 0.0, 0.0, 0.0, 0.0
+        for i in range(2):
+            rounded += ways.rounding[rows[i], f - begin]
+            rounded_wide += ways.rounding[rows[2 + i], f - begin]
+            way += ways.ways[rows[i], f - begin]
+            wide += ways.ways[rows[2 + i], f - begin]
+        between, bound, doubt = CLEAR, 0.0, 0
+        # the bodies
+        if level0 == 2 or level1 == 2:
+            proven = (level0 == 2 and not frames.undecided[f, p]) or (level1 == 2 and not frames.undecided[f + 1, p])
+            between = CONTACT if proven else UNDECIDED
+            if level0 != level1 and (level0 < 2 or level1 < 2):
+                doubt |= CONTACT_DOUBT
+        else:
+            found = (frames.clearance[f, p], frames.clearance[f + 1, p])
+            gaps = (
+                center_gap(volumes, ways.centers, frames.pairs[p], rows, f - begin),
+                center_gap(volumes, ways.centers, frames.pairs[p], rows, f + 1 - begin),
+            )
+            least = least_apart(found, gaps, way, rounded, limit)
+            if not least > 0.0 and way > 0.0:
+                doubt |= CONTACT_DOUBT
+            bound = min(max(least, 0.0), cap)
+        # their volumes
+        if wide > 0.0:
+            wide += 2.0 * rounded_wide
+        left -= wide
+        if (level0 == 0) != (level1 == 0):
+            doubt |= BOUNDS_DOUBT
+        elif level0 == 0 and wide > 0.0 and (left <= 0.0 or doubt & CONTACT_DOUBT):
+            boxes = 0.0
+            for i in range(2):
+                pose, turned = frames.poses[q, f + i], frames.turns[turn, f + i]
                 left = 0.0
-            if doubt[f, p] & CONTACT_DOUBT and level0 < 2 and level1 < 2:
-                between[f, p], bound[f, p] = UNDECIDED, np.nan
-            counts[BY_FRAMES if doubt[f, p] == 0 else IN_DOUBT] += 1
+                if not volumes_meet(volumes, a, b, pose, turned, scratch):
+                    left = max(boxes_gap(volumes, a, b, pose, turned, scratch), 0.0)
+                boxes += left
+            if not boxes > wide:
+                doubt |= BOUNDS_DOUBT
+            elif doubt & CONTACT_DOUBT:  # where the volumes stay apart so do the bodies
+                doubt = 0
+                bound = min(0.5 * (boxes - way) - rounded, cap)
+        if level1 > 0:
+            left = 0.0
+        if doubt & CONTACT_DOUBT and level0 < 2 and level1 < 2:
+            between, bound = UNDECIDED, np.nan
+        told.between[told.begin + f, column], told.bound[told.begin + f, column] = between, bound
+        told.doubt[f, p] = doubt
+        counts[BY_FRAMES if doubt == 0 else IN_DOUBT] += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,15 +13,19 @@ from replay.collision.bodies import AABB, SPHERE, Bodies, Volumes
 from replay.collision.columns import Between, Crossings
 from replay.collision.counters import Counters
 from replay.collision.crossing_look import Questions
+from replay.collision.interval_proof import Answers
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_steps import Chains
-from replay.collision.ways import fill_ways, first_ways
+from replay.collision.ways import NEAR, STRETCH, Ways, fill_stretches, first_ways, no_ways
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
-from replay.numerics.arrays import Bytes, Floats, Integers
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from replay.collision.batches import Batch
 
 RESOLUTION = 1_000
 """Longest bracket of a moment that is aimed at [ns]."""
@@ -33,44 +38,62 @@ class Course:
     Attributes:
         time: (m + 1,) [ns] of the frames at both ends of m intervals.
         first: frame of the scenario that the first interval ends at.
-        begin: frame of the block that the first interval ends at: 0, or 1 where there is no frame before the block.
-        centers, ways, rounding: see `ways.fill_ways`.
+        local: (m + 1, L, 4, 4) poses of the links in their parents.
+        travel: (L, m, 2), see `travel.link_travel`.
+        middle: (K + 1, L, 4, 4) poses in the middle frames of K stretches, see `ways.fill_stretches`.
+        share, swept: (K,) and over the stretches, as there.
     """
 
     time: Integers
     first: int
-    begin: int
-    centers: Floats
-    ways: Floats
-    rounding: Floats
+    local: Floats
+    travel: Floats
+    middle: Floats
+    share: Floats
+    swept: Ways
 
     @cached_property
-    def sums(self) -> tuple[Floats, Floats]:
-        """Each way from the block's middle frame to its ends, the larger one, and in its longest interval (V,) [m]."""
-        middle = (self.ways.shape[1] + 1) // 2
-        parts = [self.ways[:, :middle].sum(axis=1), self.ways[:, middle:].sum(axis=1)]
-        return np.maximum(*parts) * (1.0 + 2.0**-40), self.ways.max(axis=1, initial=0.0)
-
-    @cached_property
-    def largest_rounding(self) -> Floats:
-        """(V,) the largest of each row of `rounding` [m]."""
-        largest: Floats = self.rounding.max(axis=1, initial=0.0)
-        return largest
-
-    @cached_property
-    def blur(self) -> Floats:
-        """(V,) the largest rounding of a centre in each row of `centers` [m]."""
-        largest: Floats = self.centers[:, :, 3].max(axis=1)
-        return largest
+    def steps(self) -> Floats:
+        """(V, K) no way in an interval of a stretch is longer [m]."""
+        return self.swept.ways * self.share
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """What is known of c pairs over the intervals that end at n frames; crossings count from pair 0 of these."""
+class Sorted:
+    """What the stretches of a block hold of c pairs.
+
+    Attributes:
+        pairs, rows: (c, 4) see `batches.Batch`.
+        kinds: (c, K) FAR, QUIET or NEAR.
+        wanted: (Q, m + 1) link pairs and frames in which a pair is NEAR.
+        course: of the block.
+    """
+
+    pairs: Integers
+    rows: Integers
+    kinds: Bytes
+    wanted: Flags
+    course: Course
+
+    @cached_property
+    def near(self) -> Integers:
+        """Pairs that are NEAR in any stretch."""
+        return np.flatnonzero((self.kinds == NEAR).any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Columns between, bound (n, P) that answers are written to: rows are intervals from `begin` on."""
 
     between: Bytes
     bound: Floats
-    crossings: Crossings
+    begin: int
+
+    @staticmethod
+    def clear(frames: int, pairs: int, cap: float) -> Told:
+        """Return those of pairs that are clear, and farther apart than the largest bound that is told."""
+        shape = frames, pairs
+        return Told(np.full(shape, Between.CLEAR, dtype=np.uint8), np.full(shape, cap), 0)
 
 
 class Intervals:
@@ -106,7 +129,7 @@ class Intervals:
         self._limit, self._cap, self._savings = limit, cap, savings
         self._counters = counters
         self._first = first_ways(links, self._line)
-        self._depth = np.diff(self._first) - 1
+        self._ways = no_ways(int(self._first[-1]), STRETCH)
         self._paths = [linkage.ancestors(link)[::-1] for link in range(len(linkage.links))]
 
     def follow(self, motion: Motion) -> None:
@@ -123,33 +146,29 @@ class Intervals:
             first: frame of the scenario that the block begins at.
         """
         m = len(time) - 1
-        travel = np.zeros((len(self._linkage.links), m, 2))
+        travel = np.empty((len(self._linkage.links), m, 2))
         link_travel(self._line, time / 1e9, travel)
-        return self._course(np.ascontiguousarray(poses.local), travel, time, first + 1 - lead, 1 - lead)
+        return self._course(poses, travel, time, first + 1 - lead)
 
-    def _course(self, local: Floats, travel: Floats, time: Integers, first: int, begin: int) -> Course:
-        ways, rounding = np.empty((2, self._first[-1], len(local) - 1))
-        centers = np.empty((self._first[-1], len(local), 4))
-        fill_ways(self._line, self._volumes, self._links, local, travel, self._first, centers, ways, rounding)
-        return Course(time, first, begin, centers, ways, rounding)
+    def still(self, poses: LinkPoses) -> Course:
+        """Return a course of one interval in which nothing moves, between two frames that are the same."""
+        travel = np.zeros((len(self._linkage.links), 1, 2))
+        return self._course(poses, travel, np.zeros(2, dtype=np.int64), 0)
 
-    def still(self) -> Course:
-        """Return a course of one interval on which nothing moves, whatever the poses: pairs that cannot move ask it."""
-        joints, free, links = (len(part) for part in (self._linkage.joints, self._linkage.free_joints, self._paths))
-        poses = self._linkage.forward(np.zeros((2, joints)), np.tile(np.identity(4), (2, free, 1, 1)))
-        travel = np.zeros((links, 1, 2))
-        return self._course(np.ascontiguousarray(poses.local), travel, np.zeros(2, dtype=np.int64), 0, 0)
-
-    def clear(self, shape: tuple[int, int], course: Course) -> tuple[Bytes, Floats]:
-        """Return the columns of pairs that are clear and farther apart than the largest bound that is told."""
-        between, bound = np.full(shape, Between.CLEAR, dtype=np.uint8), np.full(shape, self._cap)
-        between[: course.begin], bound[: course.begin] = Between.NOT_LOOKED, np.nan
-        return between, bound
+    def _course(self, poses: LinkPoses, travel: Floats, time: Integers, first: int) -> Course:
+        local, count = np.ascontiguousarray(poses.local), -(-travel.shape[1] // STRETCH)
+        middle, share = np.empty((count + 1, *local.shape[1:])), np.empty(count)
+        swept = no_ways(int(self._first[-1]), count)
+        scratch = np.empty((len(travel), count, 2))
+        fill_stretches(
+            self._line, self._volumes, self._links, local, travel, self._first, middle, scratch, share, swept
+        )
+        return Course(time, first, local, travel, middle, share, swept)
 
     def half_steps(self, course: Course) -> Floats:
         """Return half of how far each body moves between two frames at most, seen from the world (B,) [m]."""
         world = self._first[:-1]
-        half: Floats = 0.5 * course.ways[world].max(axis=1, initial=0.0) + course.largest_rounding[world]
+        half: Floats = (0.5 * course.steps[world] + 4.0 * course.swept.rounding[world]).max(axis=1)
         return half
 
     def rows(self, pairs: Integers) -> Integers:
@@ -161,108 +180,95 @@ class Intervals:
         near = self._first[pairs] + shared[:, None]
         return np.concatenate([near, self._first[pairs] if self._volumes.kind == AABB else near], axis=1)
 
-    def sorted_out(self, pairs: Integers, middle: Floats, rows: Integers, course: Course) -> Bytes:
-        """Return what a block may hold of pairs (P,): `interval_proof.FAR`, QUIET or NEAR.
-
-        Those that are not NEAR are clear in all its frames and intervals.
+    def sorted_out(self, batch: Batch, course: Course, *, quiet: bool) -> Sorted:
+        """Return what the stretches of a block hold of a batch's pairs: what is not NEAR is clear in them.
 
         Args:
-            pairs: (P, 4) as `PairFrames.pairs`.
-            middle: (Q, 1, 4, 4) T_a_b of the links in the block's middle frame.
-            rows: of `Course.ways`.
+            batch: the pairs.
             course: of the block.
+            quiet: whether what is known of distances at the frames is our own.
         """
-        kinds = np.empty(len(pairs), dtype=np.uint8)
-        half, longest = course.sums
-        scratch = np.zeros((8, 4)), np.empty((3, 3)), np.empty(3)
+        pairs, rows = batch.rows, batch.ways
+        shape = len(pairs), len(course.share)
+        wanted = np.zeros((batch.relative.count, len(course.time)), dtype=bool)
+        if not self._savings:
+            return Sorted(pairs, rows, np.full(shape, NEAR, dtype=np.uint8), wanted, course)
+        kinds = np.empty(shape, dtype=np.uint8)
         interval_proof.sort_out(
             self._bodies,
             self._volumes,
-            course.centers,
             pairs,
-            middle,
+            batch.relative.of(course.middle),
             rows,
-            half,
-            longest,
-            course.largest_rounding,
-            course.blur,
-            self._limit,
+            course.swept,
+            len(course.time) - 1,
+            self._limit if quiet else 0.0,
             self._cap,
             kinds,
-            *scratch,
+            wanted,
+            np.zeros((8, 4)),
+            np.empty((3, 3)),
+            np.empty(3),
         )
-        return kinds
+        return Sorted(pairs, rows, kinds, wanted, course)
 
-    def quiet(self, pairs: Integers, rows: Integers, course: Course) -> Floats:
-        """Return the bounds (m, c) of QUIET pairs over the m intervals of a block, as `certify` has them."""
-        bound = np.empty((course.ways.shape[1], len(pairs)))
-        interval_proof.fill_quiet(
-            self._volumes,
-            course.centers,
-            pairs,
-            rows,
-            course.ways,
-            course.rounding,
-            self._limit,
-            self._cap,
-            bound,
-        )
-        return bound
+    def answer(self, frames: PairFrames, found: Sorted, columns: Integers, told: Told) -> Crossings:
+        """Tell what is known of pairs in a block, and return what crossed.
 
-    def answer(self, frames: PairFrames, head: PairFrames | None, rows: Integers, course: Course) -> Known:
-        """Return what is known of pairs that were decided in all frames of a block, and in the frame before it."""
-        n, count = frames.level.shape
-        between = np.full((n, count), Between.NOT_LOOKED, dtype=np.uint8)
-        bound, doubt = np.full((n, count), np.nan), np.zeros((n, count), dtype=np.uint8)
-        counts = np.zeros(interval_proof.COUNTS, dtype=np.int64)
-        head = frames if head is None else head
+        Args:
+            frames: the NEAR ones of them, decided in all frames.
+            found: see there.
+            columns: of the pairs.
+            told: written to.
+        """
+        if not found.kinds.any():  # all FAR
+            return Crossings.none()
+        course = found.course
+        counts, searched = np.zeros(interval_proof.COUNTS, np.int64), np.zeros(crossing_look.COUNTS, np.int64)
+        doubt = np.zeros((len(course.time) - 1, len(found.near)), dtype=np.uint8)
+        place = np.full(len(found.pairs), -1, dtype=np.int64)
+        place[found.near] = np.arange(len(found.near))
         interval_proof.certify(
+            self._line,
             self._volumes,
+            self._links,
+            course.local,
+            course.travel,
+            self._first,
+            found.pairs,
+            found.rows,
+            found.kinds,
+            place,
             frames,
-            head,
-            course.begin,
-            rows,
-            course.centers,
-            course.ways,
-            course.rounding,
             self._limit,
             self._cap,
-            between,
-            bound,
-            doubt,
+            Answers(columns, told.between, told.bound, told.begin, doubt),
             counts,
-            np.empty((8, 4)),
+            self._ways,
+            np.empty(len(self._links), dtype=np.int64),
+            np.zeros((8, 4)),
         )
         crossings = Crossings.none()
-        searched = np.zeros(crossing_look.COUNTS, dtype=np.int64)
         if doubt.any():
-            crossings = self._search(frames, head, course, doubt, between, bound, searched)
+            crossings = self._search(frames, course, columns[found.near], doubt, told, searched)
         self._counters.add_intervals(counts.tolist(), searched.tolist())
-        return Known(between, bound, crossings)
+        return crossings
 
     def _search(
-        self,
-        frames: PairFrames,
-        head: PairFrames,
-        course: Course,
-        doubt: Bytes,
-        between: Bytes,
-        bound: Floats,
-        counts: Integers,
+        self, frames: PairFrames, course: Course, columns: Integers, doubt: Bytes, told: Told, counts: Integers
     ) -> Crossings:
         f, p = np.nonzero(doubt)
         bodies = frames.pairs[p, :2]
-        level = np.stack([np.where(f > 0, frames.level[f - 1, p], head.level[0, p]), frames.level[f, p]], axis=1)
-        interval = f - course.begin
         chains, chain = self._chains(self._links[bodies])
         questions = Questions(
             bodies=np.ascontiguousarray(bodies),
             chain=chain,
-            time=np.ascontiguousarray(np.stack([course.time[interval], course.time[interval + 1]], axis=1)),
-            level=np.ascontiguousarray(level),
+            time=np.ascontiguousarray(np.stack([course.time[f], course.time[f + 1]], axis=1)),
+            level=np.ascontiguousarray(np.stack([frames.level[f, p], frames.level[f + 1, p]], axis=1)),
             doubt=doubt[f, p],
         )
-        found, least = between[f, p], bound[f, p]
+        cells = f + told.begin, columns[p]
+        found, least = told.between[cells], told.bound[cells]
         events = np.empty((4 * len(f), 5), dtype=np.int64)
         count = crossing_search.search(
             self._bodies,
@@ -278,32 +284,32 @@ class Intervals:
             events,
             counts,
         )
-        between[f, p], bound[f, p] = found, least
+        told.between[cells], told.bound[cells] = found, least
         question, level_, begins, earliest, latest = events[:count].T
         return Crossings(
-            pair=p[question],
+            pair=columns[p[question]],
             level=level_.astype(np.uint8),
             begins=begins == 1,
             earliest=earliest,
             latest=latest,
-            frame=course.first + interval[question],
+            frame=course.first + f[question],
         )
 
     def _chains(self, links: Integers) -> tuple[Chains, Integers]:
         """Return the ways between pairs of links, and (k, 2) each pair's: the short and the wide one."""
-        known, place = np.unique(links, axis=0, return_inverse=True)
+        asked = [(a, b) for a, b in links.tolist()]
+        known = {pair: k for k, pair in enumerate(dict.fromkeys(asked))}
         sides: list[list[int]] = []
-        for a, b in known.tolist():
+        for a, b in known:
             shared = self._shared(a, b)
             sides += [self._paths[a][shared:], self._paths[b][shared:]]
-        count = len(known)
         if self._volumes.kind == AABB:
-            for a, b in known.tolist():
+            for a, b in known:
                 sides += [self._paths[a], self._paths[b]]
         first = np.concatenate([[0], np.cumsum([len(side) for side in sides])]).astype(np.int64)
         chains = Chains(first, np.array([link for side in sides for link in side], dtype=np.int64))
-        near = place.reshape(-1)
-        return chains, np.stack([near, near + count if self._volumes.kind == AABB else near], axis=1).astype(np.int64)
+        near = np.array([known[pair] for pair in asked], dtype=np.int64)
+        return chains, np.stack([near, near + len(known) if self._volumes.kind == AABB else near], axis=1)
 
     def _shared(self, a: int, b: int) -> int:
         """Return how many links the paths from their roots to two links have in common."""

@@ -9,27 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from replay.collision import interval_proof, narrow
+from replay.collision import narrow
 from replay.collision.batches import Batch, FrameDecider, batches
 from replay.collision.bodies import Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
 from replay.collision.columns import MARGIN, Between, CollisionColumns, CollisionEntries, Crossings
 from replay.collision.counters import Counters
 from replay.collision.engines import Engine, NarrowPhase, engine_of
-from replay.collision.intervals import Course, Intervals, Known
+from replay.collision.intervals import Course, Intervals, Told
 from replay.collision.pair_frames import PairFrames
 from replay.collision.pairs import CollisionBody, Pair, PairRules
 from replay.collision.selection import Listed, Ruled, Selected
 from replay.errors import InvalidValue
 from replay.kinematics.linkage import Linkage, LinkPoses
 from replay.kinematics.motion import Motion
-from replay.numerics.arrays import Floats, Integers
+from replay.numerics.arrays import Bytes, Flags, Floats, Integers
 
 FEW_PAIRS = 512
 """Up to so many pairs all are candidates in every block: the sieve rules them out faster than a tree finds them."""
@@ -99,7 +99,7 @@ class CollisionPipeline:
         self._links = np.array([body.link for body in chosen], dtype=np.int64)
         self._place = np.full(len(bodies), -1, dtype=np.int64)
         self._place[self._used] = np.arange(len(chosen))
-        self._static: list[_Found] | None = None
+        self._rest: _Rest | None = None
         # between frames distances are our own, whatever decides at the frames
         self._own: NarrowPhase | None = None
         self._cap = math.inf if clearance == "always" else float(margin)
@@ -166,35 +166,32 @@ class CollisionPipeline:
         """
         if isinstance(self._pairs, Ruled):
             raise InvalidValue("pairs", "rules", "columns need listed pairs; ask `contacts` instead")
-        shape = (len(poses.local) - lead, self._pairs.count)
-        columns = CollisionColumns(
-            level=np.zeros(shape, dtype=np.uint8),
-            clearance=np.full(shape, np.nan),
-            evaluated=np.zeros(shape, dtype=bool),
-            undecided=np.zeros(shape, dtype=bool),
-            between=np.broadcast_to(np.uint8(Between.NOT_LOOKED), shape),
-            clearance_bound=np.broadcast_to(np.nan, shape),
-        )
-        course = None
-        if self._intervals is not None and time is not None and len(time) > 1:
+        n = len(poses.local) - lead
+        self._check(poses)
+        course = told = None
+        rest = self._at_rest(poses)
+        level, clearance = np.repeat(rest.level, n, axis=0), np.repeat(rest.clearance, n, axis=0)
+        evaluated, undecided = np.repeat(rest.evaluated, n, axis=0), np.repeat(rest.undecided, n, axis=0)
+        if self._intervals is None or time is None or len(time) < 2:
+            between = np.broadcast_to(np.uint8(Between.NOT_LOOKED), level.shape)
+            bound = np.broadcast_to(np.nan, level.shape)
+        else:
             course = self._intervals.course(poses, lead, time, first)
-            between, bound = self._intervals.clear(shape, course)
-            self.counters.intervals += (shape[0] - course.begin) * shape[1]
-            columns = replace(columns, between=between, clearance_bound=bound)
+            between, bound = np.repeat(rest.between, n, axis=0), np.repeat(rest.bound, n, axis=0)
+            between[: 1 - lead], bound[: 1 - lead] = Between.NOT_LOOKED, np.nan
+            told = Told(between, bound, 1 - lead)
+            self.counters.intervals += (len(time) - 1) * self._pairs.count
         crossings = []
-        for found in self._evaluate(poses, lead, course):
-            if found.frames is not None:
-                columns.level[:, found.columns] = found.frames.level
-                columns.clearance[:, found.columns] = found.frames.clearance
-                columns.evaluated[:, found.columns] = ~np.isnan(found.frames.clearance)
-                columns.undecided[:, found.columns] = found.frames.undecided
-            if course is not None and found.known is not None:
-                known = slice(course.begin - shape[0], None)  # of those that cannot move there is one row
-                if found.frames is not None:
-                    between[course.begin :, found.columns] = found.known.between[known]
-                bound[course.begin :, found.columns] = found.known.bound[known]
-                crossings.append(found.known.crossings.of(found.columns))
-        return replace(columns, crossings=Crossings.joined(crossings))
+        for found in self._moving(poses, lead, course, told):
+            if len(found.columns):
+                level[:, found.columns] = found.level
+                clearance[:, found.columns] = found.clearance
+                evaluated[:, found.columns] = ~np.isnan(found.clearance)
+                undecided[:, found.columns] = found.undecided
+            crossings.append(found.crossings)
+        return CollisionColumns(
+            level, clearance, evaluated, undecided, between, bound, crossings=Crossings.joined(crossings)
+        )
 
     def contacts(self, poses: LinkPoses) -> CollisionEntries:
         """Return what `run` does without the clear pairs and frames: memory and time grow with those that are near.
@@ -205,20 +202,19 @@ class CollisionPipeline:
         Accuracy: as `run`.
         """
         n = len(poses.local)
+        self._check(poses)
         frame, bodies = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)]
         level, clearance = [np.zeros(0, dtype=np.uint8)], [np.zeros(0)]
         undecided = [np.zeros(0, dtype=bool)]
-        for found in self._evaluate(poses, 0, None):
-            if found.frames is None:
-                continue
-            told, asked = found.frames, (n, len(found.columns))
-            f, p = np.nonzero(np.broadcast_to((told.level > 0) | ~np.isnan(told.clearance), asked))
-            source = np.minimum(f, len(told.level) - 1)
+        for found in (*self._at_rest(poses).found, *self._moving(poses, 0, None, None)):
+            asked = (n, len(found.columns))
+            f, p = np.nonzero(np.broadcast_to((found.level > 0) | ~np.isnan(found.clearance), asked))
+            source = np.minimum(f, len(found.level) - 1)
             frame.append(f)
-            bodies.append(self._used[told.pairs[p, :2]])
-            level.append(told.level[source, p])
-            clearance.append(told.clearance[source, p])
-            undecided.append(told.undecided[source, p])
+            bodies.append(self._used[found.frames.pairs[p, :2]])
+            level.append(found.level[source, p])
+            clearance.append(found.clearance[source, p])
+            undecided.append(found.undecided[source, p])
         frames, pairs = np.concatenate(frame), np.concatenate(bodies)
         order = np.lexsort((pairs[:, 1], pairs[:, 0], frames))
         return CollisionEntries(
@@ -229,31 +225,24 @@ class CollisionPipeline:
             undecided=np.concatenate(undecided)[order],
         )
 
-    def _evaluate(self, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
-        """Yield what is known of all pairs that may be near in a block, of those that cannot move as one frame."""
-        n = len(poses.local) - lead
+    def _check(self, poses: LinkPoses) -> None:
         if not np.isfinite(poses.local).all():
             frame, link = np.argwhere(~np.isfinite(poses.local).all(axis=(2, 3)))[0].tolist()
             place = f"poses.local[{frame}, {poses.linkage.link_names[link]}]"
             raise InvalidValue(place, poses.local[frame, link].tolist(), "link poses must be finite")
+
+    def _moving(self, poses: LinkPoses, lead: int, course: Course | None, told: Told | None) -> Iterator[_Found]:
+        """Yield what is known in a block of all pairs that can move and may be near; tell what is of its intervals."""
+        n = len(poses.local) - lead
         self.counters.pair_frames += n * self._pairs.count
+        self.counters.static += n * self._pairs.static_count
         if n == 0 or self._pairs.count == 0:
             return
-        if self._static is None:
-            one = poses.slice(0, 1)
-            still = None if self._intervals is None else self._intervals.still()
-            self._static = []
-            if self._pairs.static_count:
-                fixed = self._candidates(one, still).fixed()
-                self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
-                self._static = [found for batch in self._batches(fixed) for found in self._work(batch, one, 0, still)]
-        self.counters.static += n * self._pairs.static_count
-        yield from self._static
         if self._all is None:
             moving = self._candidates(poses, course).moving()
             self.counters.pruned_by_block += n * (self._pairs.count - self._pairs.static_count - len(moving.rows))
         for batch in self._always if self._all is not None else self._batches(moving):
-            yield from self._work(batch, poses, lead, course)
+            yield self._work(batch, poses, lead, course, told)
 
     def _candidates(self, poses: LinkPoses, course: Course | None) -> Selected:
         if self._all is not None:
@@ -263,37 +252,39 @@ class CollisionPipeline:
             reach, limit = self._intervals.half_steps(course), max(limit, self._cap)
         return self._pairs.choose(self._used[near_pairs(self._volumes, self._links, poses, limit, reach)])
 
-    def _work(self, batch: Batch, poses: LinkPoses, lead: int, course: Course | None) -> Iterator[_Found]:
-        """Yield what is found of a batch's pairs in a block."""
-        rows, columns, ways, n = batch.rows, batch.columns, batch.ways, len(poses.local)
-        if course is None or self._intervals is None:
-            frames = self._frames.decide(self.narrow_phase, batch, rows, poses)
-            yield _Found(columns, frames, None)
-            return
-        if self._savings:
-            middle = batch.relative.of(poses.local[n // 2 : n // 2 + 1])
-            kinds = self._intervals.sorted_out(rows, middle, ways, course)
-            near, quiet = kinds == interval_proof.NEAR, kinds == interval_proof.QUIET
-            if self._own is not None:  # what the other engine says of them at the frames is not known
-                near, quiet = near | quiet, np.zeros_like(quiet)
-            self.counters.pruned_by_block += (n - lead) * int(len(near) - near.sum())
-            yield self._clear(columns[quiet], self._intervals.quiet(rows[quiet], ways[quiet], course))
-            columns, rows, ways = columns[near], rows[near], ways[near]
-        shown, first = poses.slice(lead, n), poses.slice(0, 1)
-        frames = self._frames.decide(self.narrow_phase, batch, rows, shown, ways, course)
-        head = self._frames.decide(self.narrow_phase, batch, rows, first) if lead else None
-        told, before = frames, head
-        if self._own is not None:
-            told = frames._replace(clearance=self._frames.decide(self._own, batch, rows, shown).clearance)
-            if head is not None:
-                before = head._replace(clearance=self._frames.decide(self._own, batch, rows, first).clearance)
-        known = self._intervals.answer(told, before, ways, course)
-        yield _Found(columns, frames, known)
+    def _at_rest(self, poses: LinkPoses) -> _Rest:
+        """Return what is known of pairs that cannot move, by one frame of the first block that has any."""
+        if self._rest is not None:
+            return self._rest
+        told, found, course = Told.clear(1, self._pairs.count, self._cap), [], None
+        if len(poses.local) and self._pairs.static_count:
+            one, lead = poses.slice(0, 1), 0
+            if self._intervals is not None:
+                one, lead = one.joined([one, one]), 1
+                course = self._intervals.still(one)
+            fixed = self._candidates(one, course).fixed()
+            self.counters.pruned_by_block += self._pairs.static_count - len(fixed.rows)
+            found = [self._work(batch, one, lead, course, told) for batch in self._batches(fixed)]
+        rest = _Rest.of(told, found)
+        if len(poses.local):
+            self._rest = rest
+        return rest
 
-    def _clear(self, columns: Integers, bound: Floats) -> _Found:
-        """Return what is found of pairs that are clear in all of a block, with bounds (m, c) of its intervals."""
-        between = np.full((1, len(columns)), Between.CLEAR, dtype=np.uint8)
-        return _Found(columns, None, Known(between, bound, Crossings.none()))
+    def _work(self, batch: Batch, poses: LinkPoses, lead: int, course: Course | None, told: Told | None) -> _Found:
+        """Return what is found of a batch's pairs in a block, and tell what is known of its intervals."""
+        if course is None or told is None or self._intervals is None:
+            frames = self._frames.decide(self.narrow_phase, batch, batch.rows, poses)
+            return _Found(batch.columns, frames, 0, Crossings.none())
+        # of what the other engine says at the frames nothing is known
+        found = self._intervals.sorted_out(batch, course, quiet=self._own is None)
+        rows = batch.rows[found.near]
+        self.counters.pruned_by_block += (len(poses.local) - lead) * (len(batch.rows) - len(rows))
+        frames = self._frames.decide(self.narrow_phase, batch, rows, poses, found)
+        known = frames
+        if self._own is not None:
+            known = frames._replace(clearance=self._frames.decide(self._own, batch, rows, poses).clearance)
+        crossings = self._intervals.answer(known, found, batch.columns, told)
+        return _Found(batch.columns[found.near], frames, lead, crossings)
 
     def _batches(self, chosen: Selected) -> list[Batch]:
         rows = self._place[chosen.rows]
@@ -304,12 +295,47 @@ class CollisionPipeline:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Results of a batch's c pairs, which are these columns.
+    """Results of pairs of a batch, which are these c columns; the others are clear in all frames, without clearances.
 
-    `frames` holds them in all frames, in one of pairs that cannot move; it is None if they are clear in all of them,
-    without clearances, and in all intervals.
+    `frames` holds them in all frames after `lead` ones.
     """
 
     columns: Integers
-    frames: PairFrames | None
-    known: Known | None
+    frames: PairFrames
+    lead: int
+    crossings: Crossings
+
+    @property
+    def level(self) -> Bytes:
+        return self.frames.level[self.lead :]
+
+    @property
+    def clearance(self) -> Floats:
+        return self.frames.clearance[self.lead :]
+
+    @property
+    def undecided(self) -> Flags:
+        return self.frames.undecided[self.lead :]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """What is found of pairs that cannot move in one frame, and (1, P) columns in which all others are clear."""
+
+    found: list[_Found]
+    level: Bytes
+    clearance: Floats
+    evaluated: Flags
+    undecided: Flags
+    between: Bytes
+    bound: Floats
+
+    @staticmethod
+    def of(told: Told, found: list[_Found]) -> _Rest:
+        shape = told.between.shape
+        level, clearance = np.zeros(shape, dtype=np.uint8), np.full(shape, np.nan)
+        undecided = np.zeros(shape, dtype=bool)
+        for each in found:
+            level[:, each.columns], clearance[:, each.columns] = each.level, each.clearance
+            undecided[:, each.columns] = each.undecided
+        return _Rest(found, level, clearance, ~np.isnan(clearance), undecided, told.between, told.bound)

@@ -14,6 +14,8 @@ from replay.kinematics.timeline import compose
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
+_IDENTITY = np.identity(4)
+
 
 class RelativePoses:
     """Link pairs (Q, 2) of a linkage, and which ways their relative poses are made of.
@@ -57,21 +59,20 @@ class RelativePoses:
         """How many link pairs there are."""
         return len(self._pairs)
 
-    def of(self, local: Floats, wanted: Flags | None = None) -> Floats:
-        """Return T_a_b (Q, n, 4, 4) of the Q link pairs.
+    def of(self, local: Floats, chosen: Integers | None = None, wanted: Flags | None = None) -> Floats:
+        """Return T_a_b (Q, n, 4, 4) of link pairs.
 
         Args:
             local: (n, L, 4, 4) link poses in their parents.
-            wanted: (Q,) the link pairs that are asked for, all if None; what is returned of others means nothing.
+            chosen: (Q,) which link pairs, all if None.
+            wanted: (Q, n) in which frames, in all if None; what is returned of others means nothing.
         """
-        n = len(local)
-        wanted = np.ones(len(self._pairs), dtype=bool) if wanted is None else wanted
-        table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(self._pairs), n, 4, 4))
-        needed = np.zeros(len(self._ways), dtype=bool)
-        ends = self._pairs[wanted].ravel()
-        needed[ends[ends >= 0]] = True
-        local, one = np.ascontiguousarray(local), np.identity(4)
-        _relative(local, self._ways, self._pairs, needed, wanted, table, one, one.copy(), result)
+        n, pairs = len(local), self._pairs if chosen is None else self._pairs[chosen]
+        wanted = np.ones((len(pairs), n), dtype=bool) if wanted is None else wanted
+        table, result = np.empty((len(self._ways), n, 4, 4)), np.empty((len(pairs), n, 4, 4))
+        needed = np.zeros((len(self._ways), n), dtype=bool)
+        local = np.ascontiguousarray(local)
+        _relative(local, self._ways, pairs, needed, wanted, table, _IDENTITY, _IDENTITY.copy(), result)
         return result
 
 
@@ -87,8 +88,8 @@ def _rows(wanted: Integers, keys: Integers, order: Integers) -> Integers:
     float64[:, :, :, ::1],
     int64[:, ::1],
     int64[:, ::1],
-    boolean[::1],
-    boolean[::1],
+    boolean[:, ::1],
+    boolean[:, ::1],
     float64[:, :, :, ::1],
     float64[:, ::1],
     float64[:, ::1],
@@ -106,18 +107,30 @@ def _relative(
     inverse: Floats,
     result: Floats,
 ) -> None:
-    """Fill result (Q, n, 4, 4); `table` (ways, n, 4, 4) and `inverse` (4, 4), an identity at first, are scratch."""
+    """Fill result (Q, n, 4, 4) where it is wanted (Q, n).
+
+    `needed` (ways, n), all False, `table` (ways, n, 4, 4) and `inverse` (4, 4), an identity at first, are scratch.
+    """
     n = local.shape[0]
+    for q in range(len(pairs)):
+        for side in range(2):
+            if pairs[q, side] >= 0:
+                for f in range(n):
+                    needed[pairs[q, side], f] |= wanted[q, f]
     for k in range(len(ways) - 1, -1, -1):
-        if needed[k] and ways[k, 0] >= 0:
-            needed[ways[k, 0]] = True
+        if ways[k, 0] >= 0:
+            for f in range(n):
+                needed[ways[k, 0], f] |= needed[k, f]
     for k in range(len(ways)):
         parent, link = ways[k, 0], ways[k, 1]
-        for f in range(n if needed[k] else 0):
-            compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
+        for f in range(n):
+            if needed[k, f]:
+                compose(identity if parent < 0 else table[parent, f], local[f, link], table[k, f])
     for q in range(len(pairs)):
         a, b = pairs[q, 0], pairs[q, 1]
-        for f in range(n if wanted[q] else 0):
+        for f in range(n):
+            if not wanted[q, f]:
+                continue
             up = identity if a < 0 else table[a, f]
             for i in range(3):
                 for j in range(3):

@@ -12,15 +12,25 @@ from __future__ import annotations
 
 import math
 
-from numba import float64, int64
+from numba import float64, int64, uint8
 
 from replay.collision.bodies import BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
-from replay.collision.broad import BY_REPEAT, BY_SPHERE, BY_VOLUME, BY_WAY, same_pose, sphere_gap, volumes_meet
+from replay.collision.broad import (
+    BY_BLOCK,
+    BY_REPEAT,
+    BY_SPHERE,
+    BY_VOLUME,
+    BY_WAY,
+    same_pose,
+    sphere_gap,
+    volumes_meet,
+)
 from replay.collision.gjk_kernel import ROUNDING
-from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, SKIP, PairFrames
+from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, PairFrames
 from replay.collision.traversal import box_gap
 from replay.collision.volume_gap import boxes_gap
-from replay.numerics.arrays import Floats, Integers
+from replay.collision.ways import NEAR, STRETCH
+from replay.numerics.arrays import Bytes, Floats, Integers
 from replay.numerics.jit import entry, leaf_kernel
 
 _SLACK = 2.0**-43
@@ -31,10 +41,10 @@ _SLACK = 2.0**-43
     BODIES_TYPE,
     VOLUMES_TYPE,
     PAIR_FRAMES_TYPE,
-    int64,
+    uint8[:, ::1],
     int64[:, ::1],
     float64[:, ::1],
-    float64[::1],
+    float64[:, ::1],
     float64,
     int64[::1],
     float64[:, ::1],
@@ -46,9 +56,9 @@ def sieve_by_way(
     bodies: Bodies,
     volumes: Volumes,
     frames: PairFrames,
-    begin: int,
+    kinds: Bytes,
     rows: Integers,
-    ways: Floats,
+    steps: Floats,
     rounding: Floats,
     limit: float,
     counts: Integers,
@@ -56,13 +66,15 @@ def sieve_by_way(
     rotation: Floats,
     translation: Floats,
 ) -> None:
-    """Fill level and task of pairs in frames as `broad.sieve` does.
+    """Fill level and task of pairs in frames as `broad.sieve` does, in stretches in which they are NEAR.
 
     Args:
         bodies, volumes: of the scene; no boxes along the world's axes, whose way is another.
-        frames: level and task are written.
-        begin: 0, or 1 if the block has no frame before it.
-        rows, ways, rounding: of the pairs, as of `interval_proof.certify`.
+        frames: level and task are written; in other stretches they stay as they are, 0 and SKIP.
+        kinds: (P, K) of `interval_proof.sort_out`.
+        rows: of the pairs, as of `interval_proof.certify`.
+        steps: (V, K) [m] no way in an interval of a stretch is longer.
+        rounding: (V, K) [m] of places in the stretches, see `ways.fill_stretches`.
         limit: pairs farther apart than this are of no interest [m].
         counts: (COUNTS,) of `broad`, added to.
         scratch, rotation, translation: (8, 4), (3, 3), (3,) scratch.
@@ -70,23 +82,26 @@ def sieve_by_way(
     pairs, poses, level, task = frames.pairs, frames.poses, frames.level, frames.task
     for p in range(len(pairs)):
         a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
-        way_a, way_b = rows[p, 0], rows[p, 1]
-        error = 2.0 * (rounding[way_a] + rounding[way_b])
         ratio = root_ratio(bodies, volumes, a, b)
-        left = 0.0
-        for f in range(level.shape[0]):
-            if f > 0:
-                left -= ways[way_a, f - begin] + ways[way_b, f - begin]
+        last, left = len(level) - 1, 0.0
+        for f in range(last + 1):
+            # before a frame and after it lie two intervals, and it is looked at for either
+            before, after = max(f - 1, 0) // STRETCH, min(f, last - 1) // STRETCH
+            comes = f > 0 and kinds[p, before] == NEAR
+            if not comes and kinds[p, after] != NEAR:
+                counts[BY_BLOCK] += 1
+                continue
+            k = before if comes else after
+            error = 4.0 * (rounding[rows[p, 0], k] + rounding[rows[p, 1], k])
+            left = left - steps[rows[p, 0], k] - steps[rows[p, 1], k] if comes else 0.0
             if left > 0.0:
                 counts[BY_WAY] += 1
-                level[f, p], task[f, p] = 0, SKIP
                 continue
             pose = poses[q, f]
-            if f > 0 and same_pose(pose, poses[q, f - 1]):
+            if comes and same_pose(pose, poses[q, f - 1]):
                 counts[BY_REPEAT] += 1
                 level[f, p], task[f, p] = level[f - 1, p], REPEAT
                 continue
-            level[f, p], task[f, p] = 0, SKIP
             size = bodies.reach[a] + bodies.reach[b]
             size += math.sqrt(pose[0, 3] ** 2 + pose[1, 3] ** 2 + pose[2, 3] ** 2)
             margin = error + _SLACK * (size + volumes.radius[a] + volumes.radius[b])

@@ -14,6 +14,7 @@ The poses themselves are rounded: what is said of them is said with `POSE_ROUNDI
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64
@@ -22,10 +23,17 @@ from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import FREE, PRISMATIC, TIMELINE_TYPE, Timeline
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel, record
 
 ROUNDING_UP = 1.0 + 2.0**-40
 """Above the rounding of everything that is added up here."""
+
+STRETCH = 16
+"""Intervals of a block that are looked at together before each of them is."""
+
+FAR, QUIET, NEAR = range(3)
+"""What a stretch may hold of a pair: the largest bound in all intervals; nothing within the limit in any frame, and all
+intervals proven by that; or more."""
 
 
 def first_ways(links: Integers, line: Timeline) -> Integers:
@@ -43,17 +51,23 @@ def first_ways(links: Integers, line: Timeline) -> Integers:
     return np.concatenate([[0], np.cumsum(depth[links] + 1)]).astype(np.int64)
 
 
-@entry(
-    TIMELINE_TYPE,
-    VOLUMES_TYPE,
-    int64[::1],
-    float64[:, :, :, ::1],
-    float64[:, :, ::1],
-    int64[::1],
-    float64[:, :, ::1],
-    float64[:, ::1],
-    float64[:, ::1],
-)
+class Ways(NamedTuple):
+    """Where bodies are in n + 1 frames, and how far they move in the n intervals between; V rows as `first_ways`."""
+
+    centers: Floats  # (V, n + 1, 4) [m], centre of the body's bounding sphere as seen from there, and its rounding
+    ways: Floats  # (V, n) [m]
+    rounding: Floats  # (V, n) [m], rounding of the place of the body as seen from there
+
+
+WAYS_TYPE = record(Ways, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])
+
+
+def no_ways(rows: int, intervals: int) -> Ways:
+    """Return arrays to be filled."""
+    shape = rows, intervals
+    return Ways(np.empty((rows, intervals + 1, 4)), np.empty(shape), np.empty(shape))
+
+
 @leaf_kernel
 def fill_ways(
     line: Timeline,
@@ -62,65 +76,140 @@ def fill_ways(
     local: Floats,
     travel: Floats,
     first: Integers,
-    centers: Floats,
-    ways: Floats,
-    rounding: Floats,
+    top: Integers,
+    begin: int,
+    end: int,
+    found: Ways,
 ) -> None:
-    """Write where bodies are in frames, and how far they move in the intervals between.
+    """Write where bodies are in the frames begin..end, and how far they move in the intervals between.
 
     Args:
         line: of L links.
         volumes: of B bodies.
         links: (B,) the bodies' links.
-        local: (n + 1, L, 4, 4) T_parent_link in all frames.
-        travel: (L, n, 2), see `travel.link_travel`.
+        local: (m + 1, L, 4, 4) T_parent_link in all frames.
+        travel: (L, m, 2), see `travel.link_travel`.
         first: (B + 1,) see `first_ways`.
-        centers: (V, n + 1, 4) out [m], centre of the body's bounding sphere as seen from there, and its rounding.
-        ways: (V, n) out [m].
-        rounding: (V, n) out [m], rounding of the place of the body as seen from there.
+        top: (B,) the uppermost row of each body that is asked for, first[b + 1] for none.
+        begin, end: frames.
+        found: out, the frame `begin` in its first column.
     """
-    frames = len(local)
+    centers, ways, rounding = found.centers, found.ways, found.rounding
+    count = end - begin
     for body in range(len(links)):
         link, row = links[body], first[body + 1] - 1
+        if top[body] > row:
+            continue
         c, radius = volumes.center[body], volumes.radius[body]
         reach = math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + radius
-        for f in range(frames):
+        for f in range(count + 1):
             centers[row, f, 0], centers[row, f, 1], centers[row, f, 2], centers[row, f, 3] = c[0], c[1], c[2], reach
-        for f in range(frames - 1):
+        for f in range(count):
             ways[row, f] = 0.0
             rounding[row, f] = 0.0
         rests = True  # as seen from where it is so far: then one frame is as all are
-        while link >= 0:
+        while row > top[body]:
             points = centers[row]
             row -= 1
-            for f in range(frames - 1):
+            for f in range(count):
                 below, arm = ways[row + 1, f], 1.0
-                moves = travel[link, f, 0] > 0.0 or travel[link, f, 1] > 0.0
+                shift, turn = travel[link, begin + f, 0], travel[link, begin + f, 1]
+                moves = shift > 0.0 or turn > 0.0
                 rests = rests and not moves
                 if moves and line.kind[link] != PRISMATIC:
                     arm = _distance(line, link, points[f]) + radius + below
-                moved = travel[link, f, 0] * arm
+                moved = shift * arm
                 if line.kind[link] == FREE:
-                    moved = travel[link, f, 0] + travel[link, f, 1] * arm
+                    moved = shift + turn * arm
                 ways[row, f] = (below + moved) * ROUNDING_UP
             place = line.place[link]
             step = abs(place[0, 3]) + abs(place[1, 3]) + abs(place[2, 3])
-            for f in range(frames):  # the steps are added up until they are all there
+            for f in range(count + 1):  # the steps are added up until they are all there
                 if rests and f > 0:
                     for i in range(4):
                         centers[row, f, i] = centers[row, 0, i]
                 else:
-                    centers[row, f, 3] = points[f, 3] + step + _to_parent(local[f, link], points[f], centers[row, f])
-            for f in range(frames):
+                    pose = local[begin + f, link]
+                    centers[row, f, 3] = points[f, 3] + step + _to_parent(pose, points[f], centers[row, f])
+            for f in range(count + 1):
                 points[f, 3] *= POSE_ROUNDING
-            for f in range(frames - 1):
+            for f in range(count):
                 rounding[row, f] = POSE_ROUNDING * (max(centers[row, f, 3], centers[row, f + 1, 3]) + ways[row, f])
             link = line.parent[link]
-        for f in range(frames):
+        for f in range(count + 1):
             centers[row, f, 3] *= POSE_ROUNDING
 
 
+@entry(
+    TIMELINE_TYPE,
+    VOLUMES_TYPE,
+    int64[::1],
+    float64[:, :, :, ::1],
+    float64[:, :, ::1],
+    int64[::1],
+    float64[:, :, :, ::1],
+    float64[:, :, ::1],
+    float64[::1],
+    WAYS_TYPE,
+)
 @leaf_kernel
+def fill_stretches(
+    line: Timeline,
+    volumes: Volumes,
+    links: Integers,
+    local: Floats,
+    travel: Floats,
+    first: Integers,
+    middle: Floats,
+    swept: Floats,
+    share: Floats,
+    found: Ways,
+) -> None:
+    """Write where bodies are in the middle of each stretch of a block, and how far they move in all of it.
+
+    To either end of the stretch the joints travel at most half of what they are said to here; an arm in any interval of
+    it is at most that in the middle and the way of the joints below to there and through the interval. So half of a way
+    that is found is no less than the ways of the intervals up to either end together.
+
+    Args:
+        line, volumes, links, local, travel, first: as of `fill_ways`.
+        middle: (K + 1, L, 4, 4) out, T_parent_link in the middle frames of the K stretches, the last one twice.
+        swept: (L, K, 2) scratch.
+        share: (K,) out, the part of a way that no single interval of the stretch exceeds.
+        found: out, a column a stretch.
+    """
+    count = len(share)
+    for k in range(count):
+        begin, half, end = stretch(k, travel.shape[1])
+        share[k] = 0.0
+        for link in range(travel.shape[0]):
+            for i in range(2):
+                before, after, most = 0.0, 0.0, 0.0
+                for f in range(begin, end):
+                    if f < half:
+                        before += travel[link, f, i]
+                    else:
+                        after += travel[link, f, i]
+                    most = max(most, travel[link, f, i])
+                swept[link, k, i] = 2.0 * max(before, after)
+                if most > 0.0:
+                    share[k] = max(share[k], most / swept[link, k, i])
+        for copy in range(2 if k == count - 1 else 1):
+            for link in range(travel.shape[0]):
+                for i in range(4):
+                    for j in range(4):
+                        middle[k + copy, link, i, j] = local[half, link, i, j]
+    fill_ways(line, volumes, links, middle, swept, first, first, 0, count, found)
+
+
+@leaf_kernel
+def stretch(k: int, intervals: int) -> tuple[int, int, int]:
+    """Return the frames at which a block's stretch k begins, is half over and ends."""
+    begin, end = k * STRETCH, min((k + 1) * STRETCH, intervals)
+    return begin, (begin + end) // 2, end
+
+
+@inlined_kernel
 def center_gap(volumes: Volumes, centers: Floats, pair: Integers, rows: Integers, f: int) -> float:
     """Return a lower bound on the distance [m] of two bodies in frame f by their spheres.
 

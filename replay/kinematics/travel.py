@@ -48,13 +48,18 @@ SHIFT, TURN = range(2)
 
 
 @leaf_kernel
-def joint_travel(line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats) -> None:
-    """Write TRAVEL .. HIGHEST of a scalar joint over [t0, t1] [s]; `work` is (HALVINGS + 8, 8) scratch."""
+def joint_travel(
+    line: Timeline, joint: int, t0: float, t1: float, work: Floats, found: Floats, follows: bool = True
+) -> None:
+    """Write TRAVEL .. HIGHEST of a scalar joint over [t0, t1] [s]; `work` is (HALVINGS + 8, 8) scratch.
+
+    LOWEST and HIGHEST mean nothing where it is not asked how the joint `follows` its chord.
+    """
     s0, s1 = script_time(line, joint, t0), script_time(line, joint, t1)
     first = line.clock_first[joint]
     slowed = first < line.clock_first[joint + 1] and line.clock_start[first] < t1  # later is another interval's affair
-    _script_travel(line, joint, s0, s1, slowed, work, found)
-    if slowed and s1 > s0:
+    _script_travel(line, joint, s0, s1, slowed, follows, work, found)
+    if follows and slowed and s1 > s0:
         _add_warp(line, joint, t0, t1, s0, s1, found)
 
 
@@ -87,7 +92,9 @@ def _add_warp(line: Timeline, joint: int, t0: float, t1: float, s0: float, s1: f
 
 
 @leaf_kernel
-def _script_travel(line: Timeline, joint: int, t0: float, t1: float, slowed: bool, work: Floats, found: Floats) -> None:
+def _script_travel(
+    line: Timeline, joint: int, t0: float, t1: float, slowed: bool, follows: bool, work: Floats, found: Floats
+) -> None:
     """Write TRAVEL .. HIGHEST over [t0, t1] [s] of script time, the bounds as they follow the chord over it."""
     q0, q1 = scripted(line, joint, t0), scripted(line, joint, t1)
     begin, end = line.piece_first[joint], line.piece_first[joint + 1]
@@ -119,6 +126,8 @@ def _script_travel(line: Timeline, joint: int, t0: float, t1: float, slowed: boo
             power *= b - s
         rounding = max(rounding, ROUNDING * (size + abs(q0) + abs(q1)))
         total += _variation(c, a - s, b - s, size, work)
+        if not follows:
+            continue
         _bernstein(c, a - s, b - a, work[0])
         for i in range(6):
             deviation = work[0, i] - (q0 + speed * (a - t0 + (b - a) * (i / 5.0)))
@@ -227,5 +236,5 @@ def link_travel(line: Timeline, seconds: Floats, travel: Floats) -> None:
             if line.kind[link] == FREE:
                 free_travel(line, joint, seconds[f], seconds[f + 1], travel[link, f])
             else:
-                joint_travel(line, joint, seconds[f], seconds[f + 1], work, found)
+                joint_travel(line, joint, seconds[f], seconds[f + 1], work, found, False)
                 travel[link, f, 0] = found[TRAVEL]
