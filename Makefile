@@ -78,7 +78,7 @@ robot: setup  ## import the shipped robot again from its package
 	  sed -i '1i # yaml-language-server: $$schema=../../schemas/fragment.schema.json' scenarios/parts/panda.yaml && \
 	  cp $$model/LICENSE scenarios/parts/panda/
 
-bench: setup  ## speed against error, ours and other engines' (about four minutes); the report is recordings/bench/bench.html
+bench: setup  ## speed against error, ours and other engines' (about ten minutes); the report is recordings/bench/bench.html
 	$(call install,-e '.[bench]')
 	$(BIN)/replay bench -o $(RECORDINGS)/bench || [ $$? = 1 ]  # a goal that is missed is told, and no reason to stop
 	cp $(RECORDINGS)/bench/bench.png scenarios/pictures/speed_against_error.png

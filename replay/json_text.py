@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic_core import from_json
+
 from replay import limits
 
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
@@ -30,9 +32,13 @@ def read_json(text: bytes | str, *, most: int = limits.JSON_BYTES, surrogates: b
     if len(text) > most:
         raise ValueError(f"it has {len(text)} bytes; at most {most} are read")
     data = text.encode(errors="replace") if isinstance(text, str) else text
-    groups = data.count(b"[") + data.count(b"{")
+    groups = data.count(b"[") + data.count(b"{") if len(data) > limits.JSON_GROUPS else 0
     if groups > limits.JSON_GROUPS:
         raise ValueError(f"it has {groups} lists and objects; at most {limits.JSON_GROUPS} are read")
+    try:
+        return from_json(text)
+    except ValueError:
+        pass  # what it takes is JSON, but not all JSON is taken: `json` judges the rest, and says what is wrong
     try:
         value = json.loads(text)
         if not surrogates and _SURROGATE.search(data):

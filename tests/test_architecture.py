@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import replay
+from replay.sensing.kinds import KINDS
 
 PACKAGE = Path(replay.__file__).parent
 ROOMS = (
@@ -108,7 +109,6 @@ def test_functions_of_the_contract_resolve_after_import_replay_alone(name):
     assert done.stdout.strip() == "True"
 
 
-KINDS = ("distance", "capacitive")
 OF_A_KIND = ("scenario/calibration.py",)  # fits one kind's constants to a measured curve
 
 

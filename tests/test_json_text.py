@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
+import random
+import struct
+from decimal import Context, Decimal
 from pathlib import Path
 
 import pytest
@@ -27,6 +32,65 @@ def test_json_is_read_within_bounds_or_is_one_line(data, words) -> None:
     with pytest.raises(ValueError, match=words) as caught:
         read_json(data)
     assert "\n" not in str(caught.value)
+
+
+ODD = (
+    [b"NaN", b"-NaN", b"nan", b"Infinity", b"-Infinity", b"inf", b"-0", b"-0.0", b"1e999", b"-1e999", b"1e-999", b"01"]
+    + [b"1.", b".5", b"1e", b"+1", b"0x1", b"1_0", b"5e-324", b"2.2250738585072011e-308", b"1.7976931348623159e308"]
+    + [b"9007199254740993", b"9007199254740993.0", b"18446744073709551616", b"-9223372036854775809", b"9" * 4300]
+    + [b"9" * 4301, b"9" * 5000 + b".5", b"0." + b"1" * 5000, b"1e" + b"0" * 5000 + b"5", b'{"a": 1, "b": 2, "a": []}']
+    + [
+        b'"\\ud800"',
+        b'"\\udc00"',
+        b'"\\ud83d\\u0041"',
+        b'"\\ud83d\\ude00"',
+        b'"\xed\xa0\x80"',
+        b'"\xff"',
+        b'"\xc0\x80"',
+    ]
+    + [
+        b'"\t"',
+        b'"\x7f"',
+        b'"\\u0000"',
+        b'"\\x41"',
+        b'"\\/"',
+        b"\xef\xbb\xbf1",
+        b"\x0c1",
+        b"1\x00",
+        b"1 2",
+        b"",
+        b"[1,]",
+    ]
+    + [b"[,1]", b"{1:2}", b"'a'", b"1//", b"tru", b"[" * 150 + b"]" * 150, b"[" * 700 + b"]" * 700]
+    + ["[1]".encode(code) for code in ("utf-16", "utf-16-le", "utf-32")]
+)
+
+
+def _numbers(count: int) -> list[bytes]:
+    """Return numbers as texts: of any size and length, and half-way between two neighbours or nearly."""
+    rng, exact = random.Random(1), Context(prec=1200)
+    made = []
+    for _ in range(count):
+        digits = "".join(rng.choice("0123456789") for _ in range(rng.randint(1, 30)))
+        made.append(f"{rng.randrange(10 ** rng.randint(1, 25))}.{digits}e{rng.randint(-330, 330)}")
+        x = abs(struct.unpack("<d", rng.randbytes(8))[0])
+        if 1e-300 < x < 1e300:
+            between = exact.divide(exact.add(Decimal(x), Decimal(math.nextafter(x, math.inf))), Decimal(2))
+            made += [f"{between:e}", f"{exact.next_minus(between):e}", f"{exact.next_plus(between):e}"]
+        made.append(str(rng.randrange(10 ** rng.randint(1, 40))))
+    return [text.encode() for text in made]
+
+
+def test_json_is_what_pythons_own_reader_says_it_is() -> None:
+    """To the last bit of each number and in the order of keys; what the one refuses the other does."""
+    for text in [*ODD, *(b"[%s]" % odd for odd in ODD), *(b'{"k": %s}' % odd for odd in ODD), *_numbers(1000)]:
+        try:
+            expected = repr(json.loads(text))
+        except (ValueError, RecursionError):
+            with pytest.raises(ValueError, match=r"is no JSON|not UTF-8|too long|nested too deeply"):
+                read_json(text)
+        else:
+            assert repr(read_json(text, surrogates=True)) == expected, text
 
 
 def test_values_of_json_are_of_the_types_that_are_asked_for() -> None:

@@ -171,11 +171,11 @@ def test_definitions_are_read_soon(definition) -> None:
 
 
 def database(*statements: str) -> bytes:
-    base = sqlite3.connect(":memory:")
-    for statement in statements:
-        base.execute(statement)
-    base.commit()
-    return base.serialize()
+    with contextlib.closing(sqlite3.connect(":memory:")) as base:
+        for statement in statements:
+            base.execute(statement)
+        base.commit()
+        return base.serialize()
 
 
 TOPICS = "CREATE TABLE topics (id INTEGER, name TEXT, type TEXT, serialization_format TEXT)"

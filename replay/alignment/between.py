@@ -9,6 +9,9 @@ from replay.numerics.arrays import Flags, Floats, Integers
 _PARABOLA = 0.5 / 30.0**0.5
 """Root mean square of u (1 - u) / 2."""
 
+_JUMP, _JUMP_OF_TWO = 3.0, 10.0
+"""A jump is so many times as large as the two steps before and the two after it; and as these but the largest one."""
+
 
 class Places:
     """Where some times lie among the times of samples.
@@ -41,11 +44,22 @@ def line_errors(value: Floats) -> Floats:
     """Return (n - 1,) how far each line between (n,) samples may be off, root mean square.
 
     A parabola whose second differences are b leaves its chord by b u (1 - u) / 2, u in 0..1; b is the mean of those at
-    both ends. A jump between two samples is off by more, and is seen there at least.
+    both ends. A corner between two samples is off by up to 3.2 times that, a jump by more: see `jump_errors`.
     """
     bends = np.abs(np.diff(value, 2, prepend=np.nan, append=np.nan))
     bends = np.where(np.isnan(bends), 0.0, bends)
     return np.asarray(0.5 * (bends[:-1] + bends[1:]) * _PARABOLA)
+
+
+def jump_errors(value: Floats) -> Floats:
+    """Return (n - 1,) how far each line between (n,) samples may be off where it is a jump, root mean square; else 0.
+
+    A jump is somewhere between two samples, anywhere as likely: of its height the line is off by 1 / sqrt(12) at best.
+    """
+    steps = np.abs(np.nan_to_num(np.diff(value)))
+    around = np.sort(np.lib.stride_tricks.sliding_window_view(np.pad(steps, 2), 5)[:, [0, 1, 3, 4]], axis=1)
+    usual = np.minimum(_JUMP * around[:, 3], _JUMP_OF_TWO * around[:, 2])
+    return np.asarray(np.where(steps > usual, steps / np.sqrt(12.0), 0.0))
 
 
 def slopes(time: Floats, value: Floats) -> tuple[Floats, Floats]:

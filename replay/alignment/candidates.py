@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.clock_fit import ClockFit, fit_at, moved, refine
+from replay.alignment.clock_fit import ClockFit, SignalFit, fit_at, moved, refine
 from replay.alignment.search import SearchGrid, peaks
 from replay.alignment.trace import Trace
 
@@ -19,7 +19,7 @@ _MOST_CANDIDATES = 10
 _MOST_PEAKS = 40
 """Peaks of a landscape that are looked at, many of which are noise on the same hill; as many beyond the bounds."""
 
-_LEAST_GAIN = 0.1
+_LEAST_GAIN = 0.02
 """Peaks below this part of the highest are left out."""
 
 
@@ -51,9 +51,13 @@ class Candidates:
     resolution: float
     turned: bool
 
+    def telling(self, fit: ClockFit) -> tuple[SignalFit, ...]:
+        """Return the signals that say something for a clock."""
+        return tuple(signal for signal in fit.signals if self.turned or signal.scale > 0.0)
+
     def gain(self, fit: ClockFit) -> float:
         """Return what a clock explains."""
-        return sum(signal.gain for signal in fit.signals if self.turned or signal.scale > 0.0)
+        return sum(signal.gain for signal in self.telling(fit))
 
 
 def pace(traces: Sequence[Trace]) -> float:

@@ -49,6 +49,7 @@ class SignalFit:
         used: (m,) whether a sample lies between two frames that have a value.
         residual: (u,) of those, of measured size 1.
         off_lines: (u,) how far lines between frames may be off there.
+        off_jumps: (u,) how far by jumps, of which it is known between which frames and between which samples they are.
         noise: standard deviation of both.
         scale: by which the simulated signal of size 1 is best multiplied.
         gain: logarithm of the likelihood over that of a constant; 0 where nothing can be said.
@@ -62,6 +63,7 @@ class SignalFit:
     used: Flags
     residual: Floats
     off_lines: Floats
+    off_jumps: Floats
     noise: float
     scale: float
     gain: float
@@ -174,9 +176,13 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
     smooth -= (smooth * s).sum(axis=1)[:, None] * s
     smooth[np.sqrt((smooth**2).sum(axis=1)) < _LEAST_OWN * length] = 0.0
     scale = along / norm
-    off_lines = scale * trace.bends[places.index[used]]
-    noise = float(np.sqrt(squares / (count - 2) + np.mean(off_lines**2)))
-    return SignalFit(trace, used, residual, off_lines, noise, scale, float(gain), y, s, smooth, exact)
+    at = places.index[used]
+    off_lines = scale * trace.bends[at]
+    intervals = np.diff(trace.log_time)
+    sampled = np.maximum(np.append(0.0, intervals), np.append(intervals, 0.0))[used]
+    off_jumps = scale * trace.jumps[at] * (1.0 + sampled / np.diff(trace.time)[at])
+    noise = float(np.sqrt(squares / (count - 2) + np.mean(off_lines**2 + off_jumps**2)))
+    return SignalFit(trace, used, residual, off_lines, off_jumps, noise, scale, float(gain), y, s, smooth, exact)
 
 
 def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
@@ -240,7 +246,8 @@ def spreads(fit: ClockFit) -> tuple[Spread, ...]:
             weight = (fit.covariance[number][:, None] * signal.smooth).sum(axis=0) / signal.noise**2
             bins = sums.bins(time)
             left = signal.residual - (fit.step[:, None] * signal.smooth).sum(axis=0)
-            sums.add(bins, weight, left, signal.off_lines, signal.noise, signal.columns)
+            sums.add(bins, weight, left, signal.noise, signal.columns)
+            sums.hide(weight, signal.off_lines, signal.off_jumps)
             together = _products(whitening, signal.smooth.T)
             for row, column in zip(shared, together, strict=True):
                 row += np.bincount(bins, weight * column, BINS)

@@ -44,7 +44,8 @@ def _own_step(signal: SignalFit) -> tuple[float, Spread] | None:
     time = signal.log_time
     sums = SpreadSums(float(time[0]), float(time[-1]))
     bins = sums.bins(time)
-    sums.add(bins, weight, signal.residual - step * smooth, signal.off_lines, signal.noise, signal.columns)
+    sums.add(bins, weight, signal.residual - step * smooth, signal.noise, signal.columns)
+    sums.hide(weight, signal.off_lines, signal.off_jumps)
     spread = sums.spread(np.asarray([np.bincount(bins, weight * signal.noise * smooth / length, BINS)]))
     return (step, spread) if 0.0 < spread.deviation < np.inf else None
 

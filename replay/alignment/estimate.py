@@ -11,7 +11,7 @@ from replay.alignment.clock import ClockEstimate, Undetermined
 from replay.alignment.clock_fit import ClockFit, is_told, moved, refine, spreads
 from replay.alignment.delays import signal_delays, signals_agree
 from replay.alignment.pair import SignalPair
-from replay.alignment.rivals import is_plain, is_refuted, is_significant
+from replay.alignment.rivals import is_noticed, is_plain, is_refuted, is_significant
 from replay.alignment.trace import Trace, trace_of
 from replay.errors import InvalidValue
 
@@ -22,7 +22,7 @@ _LEAST_OVERLAP = 0.4
 """Of the shorter of both, scenario and log, so much must overlap."""
 
 _RIVAL = 0.3
-"""What explains less than this part of what the best clock does is no rival: short pieces are often alike."""
+"""What explains less than this part of what the best clock does must be more than chance to be a rival."""
 
 _EXACT = 1e-9
 """Times are exact to the nanosecond: no offset is told better than that [s]."""
@@ -99,14 +99,18 @@ def _only_one(found: Candidates, lowest: float, highest: float, speed: float) ->
     best = within[0]
     if all(map(is_plain, best.signals)):
         return Undetermined("a straight line, a plain curve or one jump explains the log as well as any offset")
-    if not is_significant(best, max(int((highest - lowest) * speed), 1)):
+    places = max(int((highest - lowest) * speed), 1)
+    if not is_significant(best, places):
         return Undetermined("noise hides the signals: no offset explains the log better than chance does")
     rivals = [
         fit
         for fit in within[1:]
         if abs(fit.offset - best.offset) > found.resolution
-        and found.gain(fit) > _RIVAL * found.gain(best)
         and not is_refuted(fit, best)
+        and (
+            found.gain(fit) > _RIVAL * found.gain(best)
+            or (_overlap(fit) >= _LEAST_OVERLAP and is_noticed(found.telling(fit), places))
+        )
     ]
     if rivals:
         offsets = tuple(sorted(fit.offset for fit in [best, *rivals]))

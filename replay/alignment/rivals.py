@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from replay.alignment.clock_fit import ClockFit, SignalFit
@@ -9,6 +11,9 @@ from replay.numerics.arrays import Floats
 
 _CERTAIN = 6.0
 """Logarithm of the odds at which a clock is out of the question."""
+
+_ALIKE_RESIDUALS = 2.0
+"""Residuals that are no more times as large, at another time and in proportion, are alike."""
 
 _CHANCE = 1e-4
 """Probability that what has nothing to do with the simulated signals is taken for them."""
@@ -18,6 +23,9 @@ _WHITE = 0.8
 
 _ALIKE = 0.9
 """Part of the variance above which coloured errors are a model's."""
+
+_LOOSE = 4.0
+"""Lines are off by so many times what they are in the mean where a corner or a jump is between frames."""
 
 _FITTED = 3.0
 """Scale, offset, and one more as the best of neighbours is taken."""
@@ -29,28 +37,31 @@ def is_refuted(fit: ClockFit, better: ClockFit) -> bool:
     Samples that only the other explains say nothing against it: of a periodic motion, the one with the largest overlap
     is not the likelier one. With the noise n of the better fit, the samples of this one say
 
-        2 log odds = sum r^2 / n^2 - 1  -  sum over those of both  r_better^2 / n^2 - 1,
+        2 log odds = sum over those of both (r^2 - r_better^2) / n^2  +  sum over its own (r / f n)^2 - 1,
 
-    of which the first sum has the variance 2 for each sample that is not in the second. Errors that last several
-    samples make all of it larger by their number. What lines between frames may be off is as large as its square more
-    or less in the one and in the other.
+    the second sum if it is above 0: it has the variance 2 for each sample. What was done twice is not explained better
+    where it was done at a smaller amplitude, as jitter and errors of models grow with it, nor are these the same at all
+    times: f is 2, and as many times more as the scale is larger. Errors that last several samples make all of it larger
+    by their number. What lines between frames may be off is as large as its square more or less in the one and in the
+    other, at corners and jumps up to `_LOOSE` times as much.
     """
     best = {signal.trace.name: signal for signal in better.signals}
-    odds, hidden, alone = 0.0, 0.0, 0
+    odds, own, hidden, alone = 0.0, 0.0, 0.0, 0
     for signal in fit.signals:
         other = best.get(signal.trace.name)
         if other is None:
             continue
         noise = other.noise**2
-        mine, theirs = (np.zeros(len(signal.used)) for _ in range(2))
-        mine[signal.used] = signal.residual**2 / noise - 1.0
-        theirs[other.used] = other.residual**2 / noise - 1.0
-        odds += 0.5 * float(np.sum(mine[signal.used]) - np.sum(theirs[signal.used & other.used]))
-        hidden += 0.5 * float(np.sum(signal.off_lines**2)) / noise
-        alone += int(np.sum(signal.used & ~other.used))
+        both, mine = other.used[signal.used], signal.residual**2 / noise
+        theirs = other.residual[signal.used[other.used]] ** 2 / noise
+        odds += 0.5 * float(np.sum(mine[both]) - np.sum(theirs))
+        louder = _ALIKE_RESIDUALS**2 * max(1.0, (signal.scale / other.scale) ** 2)
+        own += 0.5 * float(np.sum(mine[~both] / louder - 1.0))
+        hidden += 0.5 * _LOOSE**2 * float(np.sum(signal.off_lines**2 + signal.off_jumps**2)) / noise
+        alone += int(np.sum(~both))
     independent = sum(map(_independent, better.signals))
     certain = (_CERTAIN + 3.0 * np.sqrt(0.5 * alone)) * better.samples / independent
-    return bool(odds > certain + hidden)
+    return bool(odds + max(own, 0.0) > certain + hidden)
 
 
 def is_significant(fit: ClockFit, places: int) -> bool:
@@ -70,6 +81,15 @@ def is_significant(fit: ClockFit, places: int) -> bool:
             left = float(np.exp(-2.0 * signal.gain / len(signal.residual)))
             surprise -= float(np.log(max(betainc(0.5 * free, 0.5 * _FITTED, left), 1e-300)))
     return float(gammaincc(len(fit.signals), surprise)) * places < _CHANCE
+
+
+def is_noticed(signals: Sequence[SignalFit], places: int) -> bool:
+    """Return whether signals say more for a clock than white noise does for the best of so many places.
+
+    Of what a motion is that was done again at a small amplitude little is seen, down to what noise leaves of it.
+    """
+    odds = sum(signal.gain * _independent(signal) / len(signal.residual) for signal in signals if not is_plain(signal))
+    return bool(odds > _CERTAIN + np.log(places))
 
 
 def is_plain(signal: SignalFit) -> bool:

@@ -82,30 +82,37 @@ class SpreadSums:
         self.last = last
         self.errors = np.zeros(BINS)
         self.information = np.zeros(BINS)
-        self.hidden = 0.0
+        self.hidden, self.common = 0.0, 0.0
         self.fitted: list[Floats] = []
 
     def bins(self, time: Floats) -> Integers:
         """Return the bin of each time."""
         return np.clip((time - self.first) * (BINS / max(self.last - self.first, 1e-300)), 0, BINS - 1).astype(np.int64)
 
-    def add(
-        self, bins: Integers, weight: Floats, residual: Floats, off_lines: Floats, noise: float, columns: Floats
-    ) -> None:
+    def add(self, bins: Integers, weight: Floats, residual: Floats, noise: float, columns: Floats) -> None:
         """Take in the samples of one signal.
 
         Args:
             bins: (n,) of its samples.
             weight: (n,) the estimate's sensitivity to them.
             residual: (n,)
-            off_lines: (n,) how far what is interpolated may be off, which residuals may hide: they are fitted.
             noise: standard deviation of the residuals.
             columns: (p, n) orthonormal; what was fitted to this signal alone.
         """
         self.errors += np.bincount(bins, weight * residual, BINS)
-        self.hidden += float(((weight * off_lines) ** 2).sum())
         self.information += np.bincount(bins, (weight * noise) ** 2, BINS)
         self.fitted.extend(np.asarray(np.bincount(bins, weight * noise * column, BINS)) for column in columns)
+
+    def hide(self, weight: Floats, off_lines: Floats, off_jumps: Floats) -> None:
+        """Take in how far what is interpolated may be off, which residuals may hide: they are fitted.
+
+        Args:
+            weight: (n,) as in `add`.
+            off_lines: (n,) at each sample by itself.
+            off_jumps: (n,) at all alike: jumps at round times are all as far from the frame before.
+        """
+        self.hidden += float(((weight * off_lines) ** 2).sum())
+        self.common += float(np.abs(weight * off_jumps).sum())
 
     def spread(self, shared: Floats) -> Spread:
         """Return the spread.
@@ -127,4 +134,4 @@ class SpreadSums:
             return Spread(np.inf, 1.0, 0.0)
         variance = float((seen**2).sum()) / trace * total
         freedom = max(trace**2 / float(np.sum(K * K)), 1.0)
-        return Spread(float(np.sqrt(variance)), freedom, float(np.sqrt(self.hidden)))
+        return Spread(float(np.sqrt(variance)), freedom, float(np.hypot(np.sqrt(self.hidden), self.common)))

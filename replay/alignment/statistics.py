@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.between import Places, line_errors, slopes
+from replay.alignment.between import Places, jump_errors, line_errors, slopes
 from replay.alignment.clock import LogClock
 from replay.alignment.pair import SignalPair
 from replay.alignment.residuals import SampledFrames
@@ -135,12 +135,15 @@ def best_line(pair: SignalPair, clock: LogClock, *, confidence: float) -> LineFi
     to_offset = 1.0 / n - mean * to_scale
     columns = np.array([np.full(n, 1.0 / np.sqrt(n)), off / norm])
     slope = scale * slopes(time, simulated / largest[0])[0][places.index[used]]
-    off_lines = scale * line_errors(simulated / largest[0])[places.index[used]]
+    off_lines, off_jumps = (
+        scale * errors(simulated / largest[0])[places.index[used]] for errors in (line_errors, jump_errors)
+    )
     moves = slope, slope * (log_time - clock.reference)
     intervals = []
     for best, weight, unit in ((scale, to_scale, largest[1] / largest[0]), (offset, to_offset, largest[1])):
         sums = SpreadSums(float(log_time[0]), float(log_time[-1]))
-        sums.add(sums.bins(log_time), weight, residual, off_lines, noise, columns)
+        sums.add(sums.bins(log_time), weight, residual, noise, columns)
+        sums.hide(weight, off_lines, off_jumps)
         of_offset, of_drift = (float((weight * move).sum()) for move in moves)
         of_clock = float(np.hypot(of_offset * clock.deviations[0], of_drift * clock.deviations[1]))
         half = sums.spread(np.zeros((0, BINS))).half(confidence, of_clock)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.alignment.between import line_errors, slopes
+from replay.alignment.between import jump_errors, line_errors, slopes
 from replay.alignment.pair import SignalPair
 from replay.numerics.arrays import Flags, Floats
 
@@ -37,6 +37,7 @@ class Trace:
         log_time: (m,) of the samples [s], on the log's clock.
         measured: (m,) of mean 0 and standard deviation 1.
         bends: (n - 1,) how far each line between frames may be off, see `line_errors`.
+        jumps: (n - 1,) how far by jumps, which are known to a frame at best, see `jump_errors`.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Trace:
     log_time: Floats
     measured: Floats
     bends: Floats
+    jumps: Floats
 
     def thinned(self, most: int) -> Trace:
         """Return a trace of fewer samples, see `thinned`."""
@@ -95,10 +97,10 @@ def trace_of(pair: SignalPair, first: float = -np.inf, last: float = np.inf) -> 
     if taken is None:
         return "the measured signal is constant"
     lines, at_frames = slopes(time, simulated)
-    bends = line_errors(simulated)
-    if pair.steps:
-        bends = np.maximum(bends, np.nan_to_num(np.abs(lines)) * np.diff(time) / np.sqrt(12.0))
-    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, bends)
+    jumps = jump_errors(simulated)
+    if pair.steps:  # each ramp may be half a frame earlier or later
+        jumps = np.nan_to_num(np.abs(lines)) * np.diff(time) / np.sqrt(12.0)
+    return Trace(pair.name, time, simulated, lines, at_frames, log_time, taken, line_errors(simulated), jumps)
 
 
 def frames_of(pair: SignalPair) -> tuple[Floats, Floats]:

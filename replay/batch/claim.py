@@ -16,10 +16,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import psutil
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from replay.errors import BusyError
@@ -36,7 +34,7 @@ _PAUSE = 0.02
 class Signature(TypedDict):
     """What the lock's file says of who has it."""
 
-    process: Annotated[int, Field(gt=0, lt=1 << 31)]
+    process: int
     host: str
     since: str
 
@@ -64,7 +62,8 @@ _ours: dict[tuple[Path, int], Claim] = {}
 
 @contextlib.contextmanager
 def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
-    """Claim a folder for a `with` block; it is made when it is not there, and removed when it is empty at the end then.
+    """Claim a folder for a `with` block; it is made when it is not there, with those above
+    it, and they are removed when they are empty at the end then.
 
     Claims of the same thread may lie within each other.
 
@@ -82,7 +81,7 @@ def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
     if key in _ours:
         yield _ours[key]
         return
-    made = not shared and not directory.exists()
+    made = [] if shared else [folder for folder in (directory, *directory.parents) if not folder.exists()]
     try:
         if not shared:
             directory.mkdir(parents=True, exist_ok=True)
@@ -98,9 +97,9 @@ def claim(directory: Path, *, shared: bool = False) -> Iterator[Claim]:
         del _ours[key]
         if handle is not None:
             _release(directory, handle)
-        if made:
-            with contextlib.suppress(OSError):
-                directory.rmdir()
+        with contextlib.suppress(OSError):
+            for folder in made:
+                folder.rmdir()
 
 
 def _acquire(directory: Path, shared: bool) -> int:
@@ -153,6 +152,8 @@ def _user(handle: int) -> tuple[str, bool]:
         try:
             os.lseek(handle, 0, os.SEEK_SET)
             signed = typed(read_json(os.read(handle, 4096)), Signature)
+            if not 0 < signed["process"] < 1 << 31:
+                raise ValueError("no number of a process")
             break
         except (OSError, ValueError):
             time.sleep(_PAUSE)

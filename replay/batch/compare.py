@@ -12,7 +12,7 @@ from replay.batch.run import Execution, run_all
 from replay.batch.select import RECORDINGS, load_all
 from replay.batch.watch import Watch
 from replay.comparison.measured.result import MeasuredComparison
-from replay.comparison.measured.source import MeasuredSource, compare_recording, load_map
+from replay.comparison.measured.source import MeasuredSource, compare_recording, compare_scenario, load_map
 from replay.comparison.rules import Rules
 from replay.errors import InvalidValue
 from replay.scenario.methods import Model
@@ -64,7 +64,7 @@ def compare_all(
             if value is not None:
                 raise InvalidValue("SCENARIO", path, f"is a recording, which is not run again: {option} has no effect")
         name = scenarios[0].name
-        found = compare_recording(path, source=source, rules=rules)
+        found = _beside(path, scenarios[0], source, rules)
         visit(path, found, False)
         yield ComparedCase(name, found)
         return
@@ -75,13 +75,22 @@ def compare_all(
         )
         if run.interrupted:
             raise KeyboardInterrupt
-        for result in run.results:
+        for scenario, result in zip(scenarios, run.results, strict=True):
             if result.recordings is None or not result.status.recorded:
                 yield ComparedCase(result.name, None, result.error)
             else:
-                found = compare_recording(result.recordings.mcap, source=source, rules=rules)
+                found = _beside(result.recordings.mcap, scenario, source, rules)
                 visit(result.recordings.mcap, found, len(scenarios) > 1)
                 yield ComparedCase(result.name, found)
+
+
+def _beside(
+    recording: Path, scenario: Scenario, source: MeasuredSource | None, rules: Rules | None
+) -> MeasuredComparison:
+    """Return what a recording says beside a log; without one, beside the excerpt of it that the recording holds."""
+    if source is None:
+        return compare_recording(recording, rules=rules)
+    return compare_scenario(recording, scenario, source, rules=rules)
 
 
 def _source(scenario: Scenario, log: Path | None, mapping: Path | None) -> MeasuredSource | None:

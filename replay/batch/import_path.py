@@ -7,19 +7,17 @@ import os
 import sys
 from pathlib import Path
 
-from replay.batch.worker import Work
 
-
-def import_path(work: Work) -> list[str]:
+def import_path(module: str) -> list[str]:
     """Return where workers look for modules: where this process does, but for the current folder.
 
     Whatever lies in the folder that a command is called in, such as a json.py, is none of its business. The folder that
-    this package, or the work, has been imported from stays, as for a checkout that is the current folder.
+    this package, or the module of the work, has been imported from stays, as for a checkout that is the current folder.
     """
     homes: set[str] = set()
-    for name in ("replay", work.__module__):
-        module = sys.modules[name.partition(".")[0]]
-        places = getattr(module, "__path__", None) or [getattr(module, "__file__", None)]
+    for name in ("replay", module):
+        package = sys.modules[name.partition(".")[0]]
+        places = getattr(package, "__path__", None) or [getattr(package, "__file__", None)]
         homes.update(os.path.realpath(Path(place).parent) for place in places if place)
     with contextlib.suppress(OSError):  # the current folder may be gone
         here = os.path.realpath(Path.cwd())

@@ -13,7 +13,6 @@ import pickle
 import queue
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -23,7 +22,7 @@ from typing import Any, TypeVar
 
 import psutil
 
-from replay.batch.import_path import import_path
+from replay.batch.interpreter import Ahead, begin
 from replay.batch.memory import Peak
 from replay.batch.task import Ended, Ending, Task
 from replay.batch.worker import (
@@ -46,7 +45,6 @@ T = TypeVar("T")
 _SECONDS_BETWEEN_CHECKS = 0.1
 _SECONDS_TO_PREPARE = 1800.0  # compiling everything takes minutes on a slow machine; beyond this it hangs
 _FAILED_STARTS = 3
-_BEGIN = "import sys; sys.path[:] = sys.argv[1:]; from replay.batch.worker import main; main()"
 
 
 class Pool:
@@ -65,6 +63,7 @@ class Pool:
         check: called all the time, at least about ten times a second; what it raises ends the run and all processes.
         undisturbed: returns a context in which a request to end the run waits for `check`, so that no result is lost.
         inherit: descriptors that the workers keep open as long as they live.
+        ahead: an interpreter that has been begun already, for the first worker; it has inherited them.
 
     Raises:
         InvalidValue: a limit or the number of workers is not positive.
@@ -85,6 +84,7 @@ class Pool:
         check: Callable[[], None] = lambda: None,
         undisturbed: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
         inherit: Sequence[int] = (),
+        ahead: Ahead | None = None,
     ) -> None:
         for name, value in (("workers", workers), ("timeout", timeout), ("memory", memory)):
             if value is not None and value <= 0:
@@ -100,6 +100,7 @@ class Pool:
         self._check = check
         self._undisturbed = undisturbed
         self._inherit = inherit
+        self._ahead = ahead
 
     def run(self, tasks: Sequence[Task]) -> Generator[Ended]:
         """Yield what became of each task, in the order in which they end; close the iterator to stop early.
@@ -123,7 +124,7 @@ class Pool:
                 self._check()
                 wanted = min(self._count, len(waiting) + sum(worker.task is not None for worker in workers))
                 while len(workers) < (wanted if prepared else preparing):
-                    workers.append(_Worker(self._start, inbox, self._inherit))
+                    workers.append(_Worker(self._start, inbox, self._interpreter()))
                 spare = [worker for worker in workers if worker.task is None] if prepared else []
                 for worker in sorted(spare, key=lambda worker: worker.ready)[: max(0, len(workers) - wanted)]:
                     workers.remove(worker)
@@ -186,26 +187,22 @@ class Pool:
             for worker in workers:
                 worker.stop()
 
+    def _interpreter(self) -> subprocess.Popen[bytes]:
+        begun = self._ahead.take() if self._ahead is not None else None
+        return begun or begin(self._start.work.__module__, self._inherit)
+
 
 class _Worker:
     """A worker process as the pool sees it."""
 
     def __init__(
-        self, start: Start, inbox: queue.SimpleQueue[tuple[_Worker, Any]], inherit: Sequence[int] = ()
+        self, start: Start, inbox: queue.SimpleQueue[tuple[_Worker, Any]], process: subprocess.Popen[bytes]
     ) -> None:
         self.task: Task | None = None
         self.ready = False
         self._memory = 0
         self._began = time.monotonic()
-        self._process = subprocess.Popen(
-            # -P: not even `_BEGIN` imports from the current folder; -u: what a task printed is in its log if it dies
-            [sys.executable, "-P", "-u", "-c", _BEGIN, *import_path(start.work)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            pass_fds=inherit,
-            start_new_session=True,  # Ctrl-C is for the pool, which then ends its workers itself
-        )
+        self._process = process
         self._watched = psutil.Process(self._process.pid)
         threading.Thread(target=self._listen, args=(inbox,), name="replay-pool", daemon=True).start()
         self._send(start)

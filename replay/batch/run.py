@@ -18,6 +18,7 @@ from replay.batch.case import CaseOrder, CaseResult, CaseStatus, run_case
 from replay.batch.case_folder import KINDS, LOG, begin, finish, remove_unfinished, unwritable
 from replay.batch.claim import Claim, claim
 from replay.batch.cost import expected_cost
+from replay.batch.interpreter import Ahead
 from replay.batch.pool import Pool
 from replay.batch.prepare import PrepareKernels, needs_of
 from replay.batch.resume import earlier_result
@@ -43,6 +44,7 @@ class Execution:
         memory: most resident memory of one scenario [bytes]; None for any.
         dask: address of a Dask scheduler that runs them instead of this machine.
         certificates: for TLS with that scheduler; `distributed`'s own configuration if None.
+        ahead: what the first worker process on this machine begins as, if it has been begun already.
     """
 
     workers: int | None = None
@@ -50,6 +52,7 @@ class Execution:
     memory: int | None = None
     dask: str | None = None
     certificates: Certificates | None = None
+    ahead: Ahead | None = None
 
 
 def run_all(
@@ -153,7 +156,7 @@ def _run_orders(
         name, log = order.scenario.name, order.folder / LOG
         try:
             refuse_link(order.folder)
-            write_file(log, "")
+            write_file(log, "", lasting=False)  # a thousand that wait for the disk take seconds
         except WriteError as error:
             result = unwritable(CaseResult(name), error)
             _settle(result, file, directory)
@@ -218,7 +221,7 @@ def _endings(
         cluster = Cluster(execution.dask, run_case, certificates=execution.certificates, tell=watch.tell, **limits)
         yield from cluster.run(tasks)
     else:
-        limits |= {"tell": watch.tell, "preparing": watch.prepare, "inherit": claimed.handles}
+        limits |= {"tell": watch.tell, "preparing": watch.prepare, "inherit": claimed.handles, "ahead": execution.ahead}
         pool = Pool(run_case, workers=workers, helpers=cores, **limits)
         yield from pool.run(tasks)
 

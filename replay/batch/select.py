@@ -25,7 +25,10 @@ RULES = "rules.yaml"
 
 RECORDINGS = (".mcap", ".mcap.part")
 """What names of recordings end in, finished and unfinished ones."""
-_VERSION_KEY = re.compile(rb"^version\s*:", re.MULTILINE)
+_UTF_8_MARK, _UTF_16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
+_VERSION_KEY = re.compile(rb"""(?:\A|[\r\n])(?:---[ \t]+)?["']?version["']?\s*:""")
+_IN_BRACES = re.compile(rb"(?:\s|[#%][^\r\n]*+|---)*+\{")
+_KEY_IN_BRACES = re.compile(rb"""[{,\s]["']?version["']?\s*:""")
 _NAME_KEY = re.compile(rb"^name[ \t]*:[ \t]*([A-Za-z0-9_][A-Za-z0-9_.-]*)[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 
 
@@ -33,9 +36,9 @@ def find_scenarios(paths: Sequence[str | Path]) -> list[Path]:
     """Return the scenario files that paths stand for, each once, in the order given.
 
     A file stands for itself. A folder stands for every `*.yaml` and `*.yml` file (in upper or lower case) in it or
-    below, links to folders included, sorted by path, that has a `version` key at its top level: parts that are only
-    included have none. One that cannot be read counts too: nobody knows that it is none. Hidden files and folders, such
-    as an environment's, are not looked at.
+    below, links to folders included, sorted by path, that has a `version` key at its top level, however it is written:
+    parts that are only included have none. One that cannot be read, or is UTF-16 text, counts too: nobody knows that it
+    is none. Hidden files and folders, such as an environment's, are not looked at.
 
     Raises:
         InvalidValue: a path is not there or is an `.rrd`, or a folder holds no scenario.
@@ -62,7 +65,11 @@ def _may_be_scenario(file: Path) -> bool:
         data = _beginning(file)
     except OSError:
         return True
-    return _VERSION_KEY.search(data) is not None or is_lfs_pointer(data)
+    if data.startswith(_UTF_16_MARKS) or is_lfs_pointer(data):
+        return True
+    data = data.removeprefix(_UTF_8_MARK)
+    key = _KEY_IN_BRACES if _IN_BRACES.match(data) else _VERSION_KEY
+    return key.search(data) is not None
 
 
 def _beginning(file: Path) -> bytes:

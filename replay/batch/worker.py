@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import gc
+import importlib
 import os
 import pickle
 import queue
@@ -16,7 +17,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -117,8 +118,12 @@ class Messages:
         self._answer(Divisible())
 
 
-def main() -> None:
-    """Work until the pool closes the connection; it does so too when it dies."""
+def main(ahead: Sequence[str]) -> None:
+    """Work until the pool closes the connection; it does so too when it dies.
+
+    Args:
+        ahead: modules to load before the pool says what this worker is for.
+    """
     often, *others = gc.get_threshold()
     gc.set_threshold(100 * often, *others)  # what is loaded here stays: looking for garbage among it finds none
     orders, answers = _channels()
@@ -133,6 +138,9 @@ def main() -> None:
             answers.write(pickle.dumps(message))
             answers.flush()
 
+    for module in ahead:
+        with contextlib.suppress(Exception):  # a task that needs it will have the same trouble, and say so
+            importlib.import_module(module)
     start: Start = inbox.get()
     if start.prepare is not None:
         try:

@@ -47,6 +47,7 @@ _TREE, _PIPELINE = (
     "capacitive sensor, 26 756 triangles",
     "whole pipeline, C-arm, 26 756 triangles, 4 cones, 6 x 3 plates",
 )
+_FIELD, _KNOWN = "field on configurations whose capacitances are known", "boundary elements, extrapolated"
 _WITHOUT = "the same run without recording"
 _DIFF = "diff, 60 000 frames x 30 topics"
 
@@ -64,6 +65,12 @@ PROMISES: dict[str, Promise] = {
     "tree.6": Promise(f"{_TREE}, rtol 1e-6", "our own exact sum", 20.0),
     "tree.4": Promise(f"{_TREE}, rtol 1e-4", "our own exact sum", 100.0, stretch=500.0),
     "tree.error": _at_most("capacitive sensor, worst error over rtol", "our own exact sum", 1.001),
+    "field.worst": _at_most(f"{_FIELD}, worst plate", _KNOWN, 0.035),
+    "field.median": _at_most(f"{_FIELD}, median plate", _KNOWN, 0.01),
+    "field.covered": Promise("plates whose error field's own estimate covers", _KNOWN, 0.95, ""),
+    "field.motions": _at_most("field between and at keys of three motions, worst reading", "bem, each frame", 0.035),
+    "field.pace": Promise("field on carm_bodyguard, processor time, recording excluded", "-", 1000.0, "frames/s"),
+    "bem.worst": _at_most("bem, worst plate, beyond what is doubted of the truth", _KNOWN, 0.006),
     "pipeline.peer": Promise(f"{_PIPELINE}, rtol 1e-6", "python-fcl + 1000 rays + midpoint n=4 in NumPy", 100.0),
     "pipeline.real_time": Promise("the same at rtol 1e-4, one core", "real time at 60 Hz", 5.0, stretch=20.0),
     "recording.ratio": _at_most("recording carm_bodyguard", _WITHOUT, 1.5, "x"),

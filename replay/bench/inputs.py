@@ -65,8 +65,8 @@ def slivers(count: int, seed: int = 5) -> Floats:
     return np.stack([first, second, inner + 10.0 ** rng.uniform(-9.0, -2.0, (count, 1)) * unit(rng, count)], axis=1)
 
 
-def phantom(triangles: int) -> Floats:
-    """Return the human body of pyskindose with so many triangles (n, 3, 3) [m], centred on its box.
+def phantom(triangles: int, *, centred: bool = True) -> Floats:
+    """Return the human body of pyskindose with so many triangles (n, 3, 3) [m], centred on its box or as in its file.
 
     Raises:
         MissingPackageError: pyskindose is not installed.
@@ -76,6 +76,8 @@ def phantom(triangles: int) -> Floats:
         raise MissingPackageError("pyskindose", "the human phantom", "pip install --no-deps pyskindose")
     path = Path(found.origin).parent / "phantom_data" / PHANTOM_FILES[triangles]
     body = load_mesh(path, scale=0.01).triangles
+    if not centred:
+        return body
     corners = body.reshape(-1, 3)
     return np.ascontiguousarray(body - 0.5 * (corners.min(axis=0) + corners.max(axis=0)))
 

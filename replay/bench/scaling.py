@@ -78,7 +78,7 @@ def _frames(report: Report, chosen: Scenario, sizes: Sequence[int], rounds: int)
         simulation = Simulation(build(finer, model=MODELS[FAST]))
         contender = Contender(FAST, partial(_all, simulation), 1, lambda _: Check(0.0))
         rows += compete(f"{count} frames", [contender], rounds=rounds)
-    _law(report, "a run against its frames", "frames", "s per run", {FAST: _points(sizes, rows)}, rows)
+    law(report, "a run against its frames", "frames", "s per run", {FAST: _points(sizes, rows)}, rows)
 
 
 def _all(simulation: Simulation) -> None:
@@ -104,7 +104,7 @@ def _triangles(report: Report, sizes: Sequence[int], rounds: int) -> None:
         for row in compete(f"{count} triangles", contenders, rounds=rounds):
             rows.append(row)
             lines.setdefault(row.method, []).append((float(count), row.median))
-    _law(report, "a reading against the body's triangles", "triangles", "s per reading", lines, rows)
+    law(report, "a reading against the body's triangles", "triangles", "s per reading", lines, rows)
 
 
 def _sensors(report: Report, sizes: Sequence[int], rounds: int) -> None:
@@ -120,7 +120,7 @@ def _sensors(report: Report, sizes: Sequence[int], rounds: int) -> None:
         for row in compete(f"{count} sensors", contenders, rounds=rounds):
             rows.append(row)
             lines.setdefault(row.method, []).append((float(count), row.median))
-    _law(report, f"a frame against its sensors, {BODY} triangles", "sensors", "s per frame", lines, rows)
+    law(report, f"a frame against its sensors, {BODY} triangles", "sensors", "s per frame", lines, rows)
 
 
 def _cones(target: Target, frames: int, *, sensors: int | None = None) -> Callable[[], Floats]:
@@ -219,7 +219,7 @@ def _points(sizes: Sequence[int], rows: Sequence[Row]) -> list[tuple[float, floa
     return [(float(size), row.median) for size, row in zip(sizes, rows, strict=True)]
 
 
-def _law(report: Report, title: str, x: str, y: str, lines: Points, rows: list[Row]) -> None:
+def law(report: Report, title: str, x: str, y: str, lines: Points, rows: list[Row]) -> None:
     """Add table, plot and the fitted exponent of each line, over all sizes and over the larger half."""
     report.tables[title] = rows
     named = {f"{name}, n^{exponent(points):.2f}": points for name, points in lines.items()}

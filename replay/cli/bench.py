@@ -15,8 +15,8 @@ from replay.cli.options import format_option, note, say
 from replay.cli.values import PathName
 
 BENCHMARKS = (
-    *("collision", "between", "distance", "capacitive", "pipeline", "savings"),
-    *("scaling", "stability", "recording", "diff", "start"),
+    *("collision", "between", "distance", "capacitive", "electrostatics", "pipeline"),
+    *("savings", "scaling", "stability", "recording", "diff", "start"),
 )
 
 

@@ -11,10 +11,11 @@ from replay.cli.options import format_option, note, say
 from replay.cli.values import PathName
 
 FOLDER = PathName()
+NAMES = ("I", "II", "III", "IV", "V", "VI")
 
 
 @click.command()
-@click.argument("names", nargs=-1, type=click.Choice(["I", "II", "III", "IV"]), metavar="[I|II|III|IV]...")
+@click.argument("names", nargs=-1, type=click.Choice(NAMES), metavar="[" + "|".join(NAMES) + "]...")
 @click.option(
     "-o", "--output", type=FOLDER, default=Path("experiments"), show_default=True, help="Folder for the files."
 )
@@ -28,10 +29,12 @@ FOLDER = PathName()
 @click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 @format_option
 def experiments(names: tuple[str, ...], output: Path, scenarios: Path, overwrite: bool, form: str) -> ExitCode:
-    """Reproduce the thesis's experiments (all when none is named), with tables (CSV) and drawings (PNG).
+    """Reproduce the thesis's experiments and two more (all when none is named), with tables (CSV) and drawings (PNG).
 
     I: error and time of midpoint splitting. II: fit one plate size. III: predict the other sizes. IV: predict a
-    pivoting plate. The measured sensor of II to IV is a boundary-element solution, see scenarios/experiments/data.
+    pivoting plate; each by the thesis's model and by electrostatics (field). The measured sensor of II to IV is a
+    boundary-element solution, see scenarios/experiments/data. V: two neighbouring sensors, one covered by a hand,
+    driven alone and together. VI: a person who floats, has 100 pF to earth, is grounded.
     """
     from replay.bench.experiments.run import EXPERIMENTS, run, write
 

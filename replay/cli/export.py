@@ -43,7 +43,8 @@ def export(recording: Path, form: Format, output: Path | None, topics: tuple[str
         with McapLog(recording, salvage=True) as log:
             files = write(log, output or recording.parent, **how)
             lost = log.loss.reason if log.loss is not None else ""
-    put(map(str, files))
+    if files:
+        put(map(str, files))
     if not lost:
         return ExitCode.FINE
     note(f"{recording}: {lost}")

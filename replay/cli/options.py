@@ -14,6 +14,7 @@ from replay.cli.terminal import put
 from replay.cli.values import Memory, PathName, Seconds, ShardOf, Workers
 
 if TYPE_CHECKING:
+    from replay.batch.interpreter import Ahead
     from replay.batch.shard import Shard
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -60,8 +61,8 @@ def execution_options(command: Command) -> Command:
     return command
 
 
-def settings(options: dict[str, Any]) -> dict[str, Any]:
-    """Return `model` and `execution` of a run as the options name them."""
+def settings(options: dict[str, Any], ahead: Ahead | None = None) -> dict[str, Any]:
+    """Return `model` and `execution` of a run as the options name them, with a worker that was begun ahead."""
     from replay.batch.run import Execution
     from replay.batch.tls import Certificates
     from replay.scenario.load import load_model
@@ -70,7 +71,7 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
     if certificates is not None and options["dask"] is None:
         raise click.UsageError("--dask-ca, --dask-cert and --dask-key belong to --dask")
     how = {name: options[name] for name in ("workers", "timeout", "memory", "dask")}
-    execution = Execution(**how, certificates=certificates)
+    execution = Execution(**how, certificates=certificates, ahead=ahead)
     return {"model": None if options["model"] is None else load_model(options["model"]), "execution": execution}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,20 +42,25 @@ def run(
     Each goes to OUTPUT/NAME/NAME.mcap and .rrd. Exit codes: 2 some are not valid, the others are run; 4 an expectation
     does not hold, or a scenario failed.
     """
-    from replay.batch.run import run_all
-    from replay.batch.select import Selection
-    from replay.cli.progress import RunProgress
-    from replay.cli.results import exit_code, show
+    from replay.batch.claim import claim
+    from replay.batch.interpreter import Ahead
 
     if how["overwrite"] and how["resume"]:
         raise click.UsageError("--overwrite and --resume exclude each other")
-    settings = options.settings(how)
-    selection = Selection.of(scenarios, patterns, shard)
-    options.note_left_out(scenarios)
-    if not selection.chosen:
-        return options.nothing(patterns, shard)
-    with RunProgress() as watch:
-        settings |= {name: how[name] for name in ("overwrite", "resume")} | {"failed": selection.failed}
-        done = run_all(selection.chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **settings)
-    show(form, done)
-    return worst([exit_code(done), ExitCode.INVALID if selection.invalid else ExitCode.FINE])
+    with claim(output) as claimed, contextlib.ExitStack() as stack:
+        ahead = stack.enter_context(Ahead(claimed.handles, rrd=not no_rrd)) if how["dask"] is None else None
+        from replay.batch.run import run_all  # while the worker loads what it needs
+        from replay.batch.select import Selection
+        from replay.cli.progress import RunProgress
+        from replay.cli.results import exit_code, show
+
+        settings = options.settings(how, ahead)
+        selection = Selection.of(scenarios, patterns, shard)
+        options.note_left_out(scenarios)
+        if not selection.chosen:
+            return options.nothing(patterns, shard)
+        with RunProgress() as watch:
+            settings |= {name: how[name] for name in ("overwrite", "resume")} | {"failed": selection.failed}
+            done = run_all(selection.chosen, output, rrd=not no_rrd, savings=not no_savings, watch=watch, **settings)
+        show(form, done)
+        return worst([exit_code(done), ExitCode.INVALID if selection.invalid else ExitCode.FINE])

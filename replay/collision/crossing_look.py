@@ -9,23 +9,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import int64, uint8
+from numba import float64, int64, uint8
 
 from replay.collision import traversal
 from replay.collision.bodies import AABB, OBB, Bodies, Volumes
 from replay.collision.broad import volumes_meet
-from replay.collision.directed import Lines, lines, measure_changes, write_lines
-from replay.collision.gjk_exact import SEPARATED, UNDECIDED, Workspace, precise_points, workspace
+from replay.collision.directed import LINES_TYPE, Lines, lines, measure_changes, write_lines
+from replay.collision.gjk_exact import SEPARATED, UNDECIDED, WORKSPACE_TYPE, Workspace, precise_points, workspace
 from replay.collision.gjk_kernel import ROUNDING
 from replay.collision.narrow import hold_each_other
-from replay.collision.piece_proof import Ends, apart_by_pieces, apart_in_world, ends, sets_apart, write_end
-from replay.collision.support import Sets
+from replay.collision.piece_proof import ENDS_TYPE, Ends, apart_by_pieces, apart_in_world, ends, sets_apart, write_end
+from replay.collision.support import SETS_TYPE, Sets
 from replay.collision.traversal import STACK, closest
 from replay.collision.volume_gap import boxes_gap
 from replay.collision.way_steps import Chains, Scratch, place
 from replay.kinematics.timeline import Timeline
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import kernel, leaf_kernel, record
+from replay.numerics.jit import leaf_kernel, record
 
 PROVEN_SHARE, PROVEN_ROUNDING = 1.0 - 2.0**-38, 8.0 * ROUNDING
 """Of a distance, and of all lengths: GJK accepts one whose proven lower bound is within 1e-12 and its rounding."""
@@ -80,7 +80,26 @@ class Search(NamedTuple):
     counts: Integers  # (COUNTS,)
 
 
-@kernel
+SEARCH_TYPE = record(
+    Search,
+    WORKSPACE_TYPE,
+    float64[:, :, ::1],
+    int64[:, ::1],
+    float64[::1],
+    int64[::1],
+    float64[:, ::1],
+    float64[::1],
+    int64[::1],
+    float64[::1],
+    uint8[::1],
+    int64[::1],
+    LINES_TYPE,
+    ENDS_TYPE,
+    SETS_TYPE,
+    int64[::1],
+)
+
+
 def search_scratch(links: int, corners: Sets, counts: Integers) -> Search:
     """Return scratch for ways of at most so many links; `corners` and `counts` as `crossing_search.search` has them."""
     return Search(

@@ -23,6 +23,7 @@ from replay.collision.crossing_look import (
     CONTACT_DOUBT,
     DEPTH,
     QUESTIONS_TYPE,
+    SEARCH_TYPE,
     VOLUMES,
     Questions,
     Search,
@@ -30,10 +31,11 @@ from replay.collision.crossing_look import (
     look,
     search_scratch,
 )
-from replay.collision.support import SETS_TYPE, Sets
+from replay.collision.support import Sets
 from replay.collision.way_steps import (
     BALL,
     CHAINS_TYPE,
+    SCRATCH_TYPE,
     Chains,
     Scratch,
     least_way,
@@ -45,7 +47,7 @@ from replay.collision.way_steps import (
 )
 from replay.kinematics.timeline import TIMELINE_TYPE, Timeline, last_at_or_before
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import kernel, leaf_kernel, rare_entry
+from replay.numerics.jit import leaf_kernel, rare_entry
 
 LOOKS = 1024
 """Cap of a search: moments looked at. What is left then is undecided."""
@@ -165,21 +167,6 @@ def sweep(
     return PROVEN, bound
 
 
-@rare_entry(
-    BODIES_TYPE,
-    VOLUMES_TYPE,
-    SETS_TYPE,
-    TIMELINE_TYPE,
-    CHAINS_TYPE,
-    QUESTIONS_TYPE,
-    float64,
-    int64,
-    uint8[::1],
-    float64[::1],
-    int64[:, ::1],
-    int64[::1],
-)
-@kernel
 def search(
     bodies: Bodies,
     volumes: Volumes,
@@ -207,15 +194,28 @@ def search(
         events: (4 k, 5) out: question, level 1 or 2, whether it begins, earliest and latest [ns].
         counts: (COUNTS,) of `crossing_look`, added to.
     """
-    longest = 0
-    for row in range(len(chains.first) - 1):
-        longest = max(longest, chains.first[row + 1] - chains.first[row])
+    longest = int(np.diff(chains.first).max(initial=0))
     s, wide, r = way_scratch(longest), way_scratch(longest), search_scratch(longest, corners, counts)
-    return int(_answer(bodies, volumes, line, chains, q, cap, resolution, between, bound, events, s, wide, r))
+    return answer(bodies, volumes, line, chains, q, cap, resolution, between, bound, events, s, wide, r)
 
 
+@rare_entry(
+    BODIES_TYPE,
+    VOLUMES_TYPE,
+    TIMELINE_TYPE,
+    CHAINS_TYPE,
+    QUESTIONS_TYPE,
+    float64,
+    int64,
+    uint8[::1],
+    float64[::1],
+    int64[:, ::1],
+    SCRATCH_TYPE,
+    SCRATCH_TYPE,
+    SEARCH_TYPE,
+)
 @leaf_kernel
-def _answer(
+def answer(
     bodies: Bodies,
     volumes: Volumes,
     line: Timeline,

@@ -29,7 +29,7 @@ from replay.collision.way_steps import ALONG, BALL, Chains, Scratch
 from replay.kinematics.timeline import FREE, PRISMATIC, Timeline, half_turn, segment
 from replay.kinematics.travel import CHANGE, HIGHEST, LOWEST, joint_travel
 from replay.numerics.arrays import Floats
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import leaf_kernel, record_like
 
 
 class Lines(NamedTuple):
@@ -49,7 +49,6 @@ class Lines(NamedTuple):
     sum: Floats  # (2, 3) of n + x sum D_j n . v_j at x = 0 and 1, in the piece's frame
 
 
-@kernel
 def lines(links: int) -> Lines:
     """Return scratch for ways of up to so many links a side."""
     steps = 4 * links + 2
@@ -67,6 +66,9 @@ def lines(links: int) -> Lines:
         np.empty(steps),
         np.empty((2, 3)),
     )
+
+
+LINES_TYPE = record_like(lines(1))
 
 
 @leaf_kernel

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from replay.collision import gjk_exact, gjk_pair
-from replay.collision.gjk_exact import DIRECTION, DISTANCE, LOWER, POINT_A, POINT_B
+from replay.collision.gjk_exact import DIRECTION, DISTANCE, LOWER, POINT_A, POINT_B, precise_points, workspace
 from replay.collision.gjk_pair import LARGEST_COORDINATE, MIDDLE, RIGID_TOLERANCE
 from replay.collision.support import Sets, make_sets
 from replay.errors import InvalidValue
@@ -182,7 +182,7 @@ def _ask_all(a: Convex, b: Convex, T_a_b: ArrayLike, cutoff: float) -> tuple[Byt
     if faulty >= 0:
         _refuse_pose(f"T_a_b[{faulty}]", poses[faulty])
     status, found = np.empty(len(poses), dtype=np.uint8), np.empty(len(poses))
-    gjk_pair.ask_all(a.sets, b.sets, poses, a.reach + b.reach, cutoff, status, found)
+    gjk_pair.ask_all(a.sets, b.sets, poses, a.reach + b.reach, cutoff, workspace(), precise_points(), status, found)
     return status, found
 
 

@@ -16,7 +16,7 @@ from replay.collision import exact_simplex
 from replay.collision.support import Sets, candidates
 from replay.numerics import double_double as dd
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel, record_like
 
 SEPARATED = 0
 CONTACT = 1
@@ -65,13 +65,14 @@ class Workspace(NamedTuple):
     result: Floats  # (16,), see DISTANCE..EXACT
 
 
-@kernel
 def workspace() -> Workspace:
     """Return fresh scratch for queries."""
     return Workspace(np.zeros((5, 2), dtype=np.int64), np.zeros((4, 3)), np.zeros(4), np.zeros(16))
 
 
-@kernel
+WORKSPACE_TYPE = record_like(workspace())
+
+
 def precise_points() -> Floats:
     """Return scratch (4, 3, 2) for `refine`: the points of a simplex in double-doubles."""
     return np.zeros((4, 3, 2))

@@ -43,6 +43,9 @@ MIDDLE = 13
 """Beside what `gjk_exact` writes: the point halfway between the witness points, 3 numbers."""
 
 
+_workspace, _precise_points = kernel(workspace), kernel(precise_points)
+
+
 @kernel
 def ask(a: Floats, b: Floats, pose_a: Floats, pose_b: Floats, cutoff: float, answer: Floats) -> int:
     """Return SEPARATED, CONTACT, UNDECIDED or a FAULT_*, and the outcome in world coordinates.
@@ -70,7 +73,7 @@ def ask(a: Floats, b: Floats, pose_a: Floats, pose_b: Floats, cutoff: float, ans
     _place(b, pose_b, half, -1.0, placed_b)
     largest = _center(placed_a, placed_b, shift)
     scale = 2.0 ** math.frexp(largest)[1] if largest > 0.0 else 1.0
-    work, precise = workspace(), precise_points()
+    work, precise = _workspace(), _precise_points()
     size = 2.0 * math.sqrt(3.0)  # every coordinate is below 1
     one, other = _single(placed_a, scale), _single(placed_b, scale)
     status = query(one, 0, other, 0, np.identity(3), np.zeros(3), size, cutoff, 0.0, work, precise)
@@ -181,7 +184,17 @@ def _to_world(
 
 
 @kernel
-def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status: Bytes, distance: Floats) -> None:
+def ask_all(
+    a: Sets,
+    b: Sets,
+    T_a_b: Floats,
+    reach: float,
+    cutoff: float,
+    work: Workspace,
+    precise: Floats,
+    status: Bytes,
+    distance: Floats,
+) -> None:
     """Write status and distance of set 0 of a and set 0 of b at each of T_a_b (n, 4, 4).
 
     Args:
@@ -189,10 +202,10 @@ def ask_all(a: Sets, b: Sets, T_a_b: Floats, reach: float, cutoff: float, status
         T_a_b: rigid.
         reach: max|a| + max|b| [m].
         cutoff: as `gjk_kernel.query`.
+        work, precise: overwritten.
         status: (n,) out.
         distance: (n,) out [m]: 0 unless SEPARATED, a lower bound above a finite cutoff.
     """
-    work, precise = workspace(), precise_points()
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for k in range(len(T_a_b)):
         square = 0.0

@@ -24,7 +24,7 @@ from replay.collision.ways import FAR, NEAR, QUIET, WAYS_TYPE, Ways, center_gap,
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import TIMELINE_TYPE, Timeline
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel, record
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel, record
 
 COUNTS = 2
 BY_FRAMES, IN_DOUBT = range(COUNTS)
@@ -116,7 +116,7 @@ def sort_out(
                 wanted[q, f] = True
 
 
-@leaf_kernel
+@inlined_kernel
 def least_apart(
     found: tuple[float, float], gaps: tuple[float, float], way: float, rounding: float, limit: float
 ) -> float:

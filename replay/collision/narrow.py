@@ -13,7 +13,7 @@ from replay.collision.gjk_exact import CONTACT, LEFT, SEPARATED, UNDECIDED, Work
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, REPEAT, RUN, PairFrames
 from replay.collision.traversal import STACK, closest, contains_part
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import entry, kernel, leaf_kernel, rare_entry
+from replay.numerics.jit import entry, inlined_kernel, kernel, leaf_kernel, rare_entry, record_like
 
 COUNTS = traversal.COUNTS + 4
 RUNS, SEEN_INSIDE, CONTACTS, UNDECIDEDS = range(traversal.COUNTS, COUNTS)
@@ -35,20 +35,45 @@ def decide(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -
     """
     left = np.ones(len(frames.pairs), np.uint8)
     held = np.zeros(frames.task.shape, np.uint8)
-    decide_by_doubles(bodies, frames, limit, left, held, counts)
+    scratch = _scratch(len(counts))
+    decide_by_doubles(bodies, frames, limit, left, held, scratch, counts)
     if left.any():
-        decide_all(bodies, frames, limit, left, held, counts)
+        decide_all(bodies, frames, limit, left, held, scratch, precise_points(), counts)
     if held.any():
         look_inside(bodies, frames, limit, held, counts)
 
 
-_DECIDES = (BODIES_TYPE, PAIR_FRAMES_TYPE, float64, uint8[::1], uint8[:, ::1], int64[::1])
+class _Scratch(NamedTuple):
+    """What a pair is decided with, and the counters of the one at hand."""
+
+    work: Workspace
+    nodes: Integers
+    gaps: Floats
+    seed: Integers
+    rotation: Floats
+    translation: Floats
+    counts: Integers
 
 
-@entry(*_DECIDES)
-@kernel
+def _scratch(counts: int = COUNTS) -> _Scratch:
+    return _Scratch(
+        workspace(),
+        np.empty((STACK, 2), np.int64),
+        np.empty(STACK),
+        np.empty(2, np.int64),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.zeros(counts, np.int64),
+    )
+
+
+_DECIDES = (BODIES_TYPE, PAIR_FRAMES_TYPE, float64, uint8[::1], uint8[:, ::1], record_like(_scratch()))
+
+
+@entry(*_DECIDES, int64[::1])
+@leaf_kernel
 def decide_by_doubles(
-    bodies: Bodies, frames: PairFrames, limit: float, left: Bytes, held: Bytes, counts: Integers
+    bodies: Bodies, frames: PairFrames, limit: float, left: Bytes, held: Bytes, s: _Scratch, counts: Integers
 ) -> None:
     """Decide pairs as far as doubles do.
 
@@ -56,23 +81,37 @@ def decide_by_doubles(
         bodies, frames, limit, counts: as `decide` has them.
         left: (P,) which pairs to decide; 0 from then on for those that are.
         held: (n, P) out: 1 where surfaces are apart and may still hold each other.
+        s: overwritten.
     """
-    s = _scratch(counts)
     for p in range(len(frames.pairs)):
         if left[p] and _decide_pair(bodies, frames, p, limit, held, s, None):
             left[p] = 0
-            counts += s.counts
+            _add(counts, s.counts)
 
 
-@rare_entry(*_DECIDES)
-@kernel
-def decide_all(bodies: Bodies, frames: PairFrames, limit: float, left: Bytes, held: Bytes, counts: Integers) -> None:
+@rare_entry(*_DECIDES, float64[:, :, ::1], int64[::1])
+@leaf_kernel
+def decide_all(
+    bodies: Bodies,
+    frames: PairFrames,
+    limit: float,
+    left: Bytes,
+    held: Bytes,
+    s: _Scratch,
+    precise: Floats,
+    counts: Integers,
+) -> None:
     """Decide pairs that are `left`, by double-doubles where doubles do not; arguments as `decide_by_doubles`."""
-    s, precise = _scratch(counts), precise_points()
     for p in range(len(frames.pairs)):
         if left[p]:
             _decide_pair(bodies, frames, p, limit, held, s, precise)
-            counts += s.counts
+            _add(counts, s.counts)
+
+
+@leaf_kernel
+def _add(counts: Integers, more: Integers) -> None:
+    for k in range(len(counts)):
+        counts[k] += more[k]
 
 
 @rare_entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, uint8[:, ::1], int64[::1])
@@ -89,31 +128,6 @@ def look_inside(bodies: Bodies, frames: PairFrames, limit: float, held: Bytes, c
                     counts[RUNS] -= 1  # it was counted when it was decided
                     counts[SEEN_INSIDE] += 1
                     write_found(frames, f, p, CONTACT, 0.0, limit, counts)
-
-
-class _Scratch(NamedTuple):
-    """What a pair is decided with, and the counters of the one at hand."""
-
-    work: Workspace
-    nodes: Integers
-    gaps: Floats
-    seed: Integers
-    rotation: Floats
-    translation: Floats
-    counts: Integers
-
-
-@kernel
-def _scratch(counts: Integers) -> _Scratch:
-    return _Scratch(
-        workspace(),
-        np.empty((STACK, 2), np.int64),
-        np.empty(STACK),
-        np.empty(2, np.int64),
-        np.empty((3, 3)),
-        np.empty(3),
-        np.zeros_like(counts),
-    )
 
 
 @leaf_kernel
@@ -138,7 +152,7 @@ def _decide_pair(
     return True
 
 
-@leaf_kernel
+@inlined_kernel
 def is_asked_for(frames: PairFrames, f: int, p: int, rotation: Floats, translation: Floats) -> bool:
     """Return whether a pair is to be decided in a frame, and write its pose; a repeated frame takes the last answer."""
     if frames.task[f, p] == REPEAT:

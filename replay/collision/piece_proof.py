@@ -24,7 +24,7 @@ from replay.collision.support import Sets
 from replay.collision.traversal import QUERIES, STACK, box_gap
 from replay.collision.way_steps import Scratch
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import kernel, leaf_kernel
+from replay.numerics.jit import leaf_kernel, record_like
 
 MOST_PIECES = 512
 """Cap of pairs of convex sets looked at for one interval; shorter ones have fewer that are near."""
@@ -40,10 +40,12 @@ class Ends(NamedTuple):
     nodes: Integers  # (STACK, 2)
 
 
-@kernel
 def ends() -> Ends:
     """Return scratch."""
     return Ends(np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3)), np.empty(3), np.empty((STACK, 2), np.int64))
+
+
+ENDS_TYPE = record_like(ends())
 
 
 @leaf_kernel

@@ -15,6 +15,7 @@ from replay.collision.gjk_exact import (
     SEPARATED,
     STEPS,
     UNDECIDED,
+    WORKSPACE_TYPE,
     Workspace,
     precise_points,
     workspace,
@@ -63,11 +64,17 @@ def closest_of_all(
     return SEPARATED, best if found else np.inf
 
 
-@entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, int64[::1])
-@kernel
 def decide_without_savings(bodies: Bodies, frames: PairFrames, limit: float, counts: Integers) -> None:
     """Do as `narrow.decide`, by every convex set of one body against all of the other."""
-    work, precise = workspace(), precise_points()
+    decide_each(bodies, frames, limit, workspace(), precise_points(), counts)
+
+
+@entry(BODIES_TYPE, PAIR_FRAMES_TYPE, float64, WORKSPACE_TYPE, float64[:, :, ::1], int64[::1])
+@kernel
+def decide_each(
+    bodies: Bodies, frames: PairFrames, limit: float, work: Workspace, precise: Floats, counts: Integers
+) -> None:
+    """Do what `decide_without_savings` does, in arrays that it has made."""
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for p in range(len(frames.pairs)):
         for f in range(frames.task.shape[0]):

@@ -19,7 +19,7 @@ from replay.collision.gjk_kernel import ROUNDING, query
 from replay.geometry.containment import inside
 from replay.geometry.tree import MAX_DEPTH, Tree
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import entry, kernel, leaf_kernel
+from replay.numerics.jit import entry, inlined_kernel, kernel, leaf_kernel
 
 STACK = 4 * MAX_DEPTH
 """Room for waiting node pairs: each of the at most 2 MAX_DEPTH splits on the way down leaves one behind."""
@@ -29,7 +29,7 @@ BOXES, QUERIES, ITERATIONS, IN_DOUBLE_DOUBLE = range(COUNTS)
 """Rows of the counters: node pairs bounded, GJK queries, their iterations, and queries that needed 106 bits."""
 
 
-@leaf_kernel
+@inlined_kernel
 def box_gap(bodies: Bodies, i: int, j: int, rotation: Floats, translation: Floats, slack: float) -> float:
     """Return a lower bound on the distance [m] of node i of body A and node j of body B (global rows), B at (R, t)."""
     ca, wa = bodies.node_center, bodies.node_half

@@ -22,7 +22,7 @@ from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import FIXED, FREE, PRISMATIC, Timeline, compose, local_pose
 from replay.kinematics.travel import HALVINGS, SHIFT, TRAVEL, TURN, free_travel, joint_travel
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import kernel, leaf_kernel, record
+from replay.numerics.jit import leaf_kernel, record, record_like
 
 ROUNDING_UP = 1.0 + 2.0**-40
 
@@ -60,7 +60,6 @@ class Scratch(NamedTuple):
     center: Floats  # (2, 3) of the bodies' spheres, in the common ancestor
 
 
-@kernel
 def way_scratch(links: int) -> Scratch:
     """Return scratch for ways of up to so many links a side."""
     steps = 4 * links + 2
@@ -84,6 +83,9 @@ def way_scratch(links: int) -> Scratch:
         np.zeros((3, 3)),
         np.empty((2, 3)),
     )
+
+
+SCRATCH_TYPE = record_like(way_scratch(1))
 
 
 @leaf_kernel

@@ -23,7 +23,7 @@ from replay.collision.bodies import VOLUMES_TYPE, Volumes
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import FREE, PRISMATIC, TIMELINE_TYPE, Timeline
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel, record
+from replay.numerics.jit import entry, inlined_kernel, leaf_kernel, record
 
 ROUNDING_UP = 1.0 + 2.0**-40
 """Above the rounding of everything that is added up here."""
@@ -209,7 +209,7 @@ def stretch(k: int, intervals: int) -> tuple[int, int, int]:
     return begin, (begin + end) // 2, end
 
 
-@leaf_kernel
+@inlined_kernel
 def center_gap(volumes: Volumes, centers: Floats, pair: Integers, rows: Integers, f: int) -> float:
     """Return a lower bound on the distance [m] of two bodies in frame f by their spheres.
 

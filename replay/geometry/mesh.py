@@ -168,8 +168,9 @@ def solid_from_triangles(triangles: Floats) -> Solid:
 def _on_welding(points: Floats, taken_for: Integers, effect: str) -> str:
     moved = points - points[taken_for]
     furthest = float(np.sqrt(np.max(np.sum(moved * moved, axis=1))))
-    which = count(int(np.count_nonzero(taken_for != np.arange(len(points)))), "corner")
-    return f"{which} at most {furthest:.2g} m from another one were taken for it, {effect}"
+    number = int(np.count_nonzero(taken_for != np.arange(len(points))))
+    verb = "was" if number == 1 else "were"
+    return f"{count(number, 'corner')} at most {furthest:.2g} m from another one {verb} taken for it, {effect}"
 
 
 def _closed_edges(before: Topology, after: Topology) -> str:

@@ -39,6 +39,7 @@ _TRIALS = (400, 40)  # axes tried on small hulls, and on hulls of thousands of v
 _KEPT = (8, 2)  # boxes kept of them
 _TURNED = (20, 2)  # boxes turned at random
 _LOOKED_AT = 2000  # faces that give trial axes
+_FEW = 32  # points
 _SMALL_HULL = 250  # vertices from which the effort goes down in proportion
 
 
@@ -57,9 +58,9 @@ def box_axes(points: Floats, hull: Callable[[], Hull | None], covariance: Floats
     lower_pair = middle - low <= NEARLY_REPEATED * middle
     upper_pair = high - middle <= NEARLY_REPEATED * high
     if middle <= _FLAT * high or (lower_pair and not upper_pair):
-        return _about(_corners(points, hull()), axes[2])
+        return _about(_turned(points, hull), axes[2])
     if low <= _FLAT * high or (upper_pair and not lower_pair):
-        return _about(_corners(points, hull()), axes[0])
+        return _about(_turned(points, hull), axes[0])
     if lower_pair and (around := hull()) is not None:
         corners = _corners(points, around)
         trials, kept, turned = (_effort(bounds, len(corners)) for bounds in (_TRIALS, _KEPT, _TURNED))
@@ -72,6 +73,11 @@ def box_axes(points: Floats, hull: Callable[[], Hull | None], covariance: Floats
 
 def _corners(points: Floats, hull: Hull | None) -> Floats:
     return points if hull is None else np.ascontiguousarray(points[hull.vertices])
+
+
+def _turned(points: Floats, hull: Callable[[], Hull | None]) -> Floats:
+    """Return the points that a box is turned about; of few, all: their hull would take longer."""
+    return points if len(points) <= _FEW else _corners(points, hull())
 
 
 def _effort(bounds: tuple[int, int], vertices: int) -> int:

@@ -35,7 +35,7 @@ def cuboid(size: Sequence[float]) -> Solid:
     corners = np.array([[sx * x, sy * y, sz * z] for sz in (-1, 1) for sy in (-1, 1) for sx in (-1, 1)])
     # corner k has x by bit 0, y by bit 1, z by bit 2 of k
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    return Solid(_quads(corners[np.array(quads)]), pieces=(corners,))
+    return Solid(_quads(corners[np.array(quads)]), pieces=(corners,), strictly_convex=True)
 
 
 def cube(edge: float) -> Solid:
@@ -48,7 +48,7 @@ def plane(size: Sequence[float]) -> Solid:
     """Return a rectangle of edge lengths size (2,) [m] in the xy plane, centred, normal +z, without volume."""
     x, y = (0.5 * _positive(f"size[{k}]", value) for k, value in enumerate(_numbers("size", size, 2)))
     corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-    return Solid(_quads(corners[None]), pieces=(corners,), watertight=False)
+    return Solid(_quads(corners[None]), pieces=(corners,), strictly_convex=True, watertight=False)
 
 
 @kept

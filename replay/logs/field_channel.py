@@ -11,19 +11,20 @@ import numpy as np
 
 from replay import limits
 from replay.errors import RecordingError
-from replay.logs.field_path import ABSENT, FieldPath, entry_of
+from replay.logs.field_path import ABSENT, FieldPath
 from replay.logs.joint_log import leading_zeros
 from replay.logs.joint_messages import time_stamp
 from replay.logs.mcap_chunks import MessageRun
 from replay.logs.mcap_records import Channel
 from replay.logs.message_log import MessageLog
 from replay.logs.protobuf import message_type
+from replay.logs.siblings import siblings
 from replay.logs.times import MAX_TIME
 from replay.logs.values import value_decoder
 from replay.logs.wire import MessageShape, Slot, shape_of
 from replay.numerics.arrays import Flags, Floats, Integers
 
-_STAMPS = ("timestamp", "header.stamp", "stamp")
+_STAMPS = (("timestamp",), ("header", "stamp"), ("stamp",))
 """Where messages have their own time stamps."""
 _WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _Cell = tuple[Slot, int]
@@ -63,14 +64,6 @@ class FieldChannel:
         self._decode = decode
         protobuf = schema is not None and self.channel.encoding == "protobuf"
         self._type = message_type(self.file, schema.name, schema.data) if schema is not None and protobuf else None
-        self._single: dict[str, FieldPath] = {}
-        self._entries: dict[FieldPath, dict[str, int]] = {}  # by list: of joints' positions, say, many are read
-        for path, steps in self.paths.items():
-            *above, last = steps.steps
-            if above and isinstance(last, int):
-                self._entries.setdefault(FieldPath("", tuple(above)), {})[path] = last
-            else:
-                self._single[path] = steps
         self.values = {path: [] for path in self.paths}
         self.there = {path: [] for path in self.paths}
         self._known: tuple[MessageShape, dict[str, _Cell], tuple[Slot, Slot] | None] | None = None
@@ -115,27 +108,28 @@ class FieldChannel:
         values = {path: np.full(count, np.nan) for path in self.paths}
         there = {path: np.zeros(count, dtype=np.bool_) for path in self.paths}
         stamps = np.zeros(count, dtype=np.int64)
-        lists = [_Entries(parent, tuple(of_it), tuple(of_it.values())) for parent, of_it in self._entries.items()]
+        groups = siblings(self.paths)
+        alone = {path: steps for path, steps in self.paths.items() if isinstance(steps.steps[-1], tuple)}
         for k, data in enumerate(run.messages()):
             message = self._decoded(data)
             stamps[k] = self._stamp(message)
-            for path, steps in self._single.items():
+            for path, steps in alone.items():
                 found = steps.value(message)
                 if found is not ABSENT:
                     values[path][k] = self._number(path, found)
                     there[path][k] = True
-            for entries in lists:
-                entries.take(k, message)
-        for entries in lists:
-            table = entries.table()
-            for column, path in enumerate(entries.paths):
-                there[path][entries.at] = True
+            for group in groups:
+                group.take(k, message)
+        for group in groups:
+            at, table = np.array(group.at, dtype=np.int64), group.table()
+            for column, path in enumerate(group.paths):
                 if table is not None:
-                    values[path][entries.at] = table[:, column]
+                    there[path][at] = True
+                    values[path][at] = table[:, column]
                 else:
-                    numbers = [self._number(path, row[column]) for row in entries.rows if row[column] is not ABSENT]
-                    there[path][entries.at] = [row[column] is not ABSENT for row in entries.rows]
-                    values[path][there[path]] = numbers
+                    there[path][at] = [row[column] is not ABSENT for row in group.rows]
+                    found = [self._number(path, row[column]) for row in group.rows if row[column] is not ABSENT]
+                    values[path][there[path]] = found
         for path in self.paths:
             self.values[path].append(values[path])
             self.there[path].append(there[path])
@@ -154,7 +148,7 @@ class FieldChannel:
     def _stamp(self, message: Any) -> int:
         for path in _STAMPS:
             found: Any = message
-            for step in path.split("."):
+            for step in path:
                 found = found.get(step) if type(found) is dict or isinstance(found, Mapping) else None
             if found is not None and isinstance(found, str | Mapping):
                 try:
@@ -238,7 +232,7 @@ def _is_name(key: str, text: str) -> bool:
 def _stamp_of(shape: MessageShape) -> tuple[Slot, Slot] | None:
     for path in _STAMPS:
         for names in (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec")):
-            found = tuple(shape.slots.get(f"{path}.{name}") for name in names)
+            found = tuple(shape.slots.get(".".join((*path, name))) for name in names)
             if found[0] is not None and found[1] is not None:
                 return found[0], found[1]
     return None
@@ -246,46 +240,3 @@ def _stamp_of(shape: MessageShape) -> tuple[Slot, Slot] | None:
 
 def _joined(parts: Sequence[Any], kind: Any) -> Any:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=kind)
-
-
-@dataclass(eq=False)
-class _Entries:
-    """Some entries of one list in messages; of many plain numbers one array is made.
-
-    Attributes:
-        parent: where the list is.
-        paths: of the entries, as they are written.
-        numbers: theirs.
-        at: which messages have the list.
-        rows: its entries in each of these, ABSENT beyond its end.
-        last: the largest of the numbers.
-    """
-
-    parent: FieldPath
-    paths: tuple[str, ...]
-    numbers: tuple[int, ...]
-    at: list[int] = field(default_factory=list)
-    rows: list[list[Any]] = field(default_factory=list)
-    last: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.last = max(self.numbers)
-
-    def take(self, k: int, message: Any) -> None:
-        """Take the entries of message k."""
-        found = self.parent.value(message)
-        if found is ABSENT:
-            return
-        self.at.append(k)
-        if type(found) is list and len(found) > self.last:
-            self.rows.append([found[number] for number in self.numbers])
-        else:
-            self.rows.append([entry_of(found, number) for number in self.numbers])
-
-    def table(self) -> Floats | None:
-        """Return the rows as an array; None if not all are plain numbers."""
-        try:
-            table = np.array(self.rows)
-        except ValueError:  # lists of several lengths
-            return None
-        return table.astype(np.float64) if table.ndim == 2 and table.dtype.kind in "bif" else None

@@ -47,14 +47,15 @@ class FieldPath:
         """Return what stands there in a message of mappings and lists; `ABSENT` where there is nothing."""
         above: Any = None
         for step in self.steps:
-            below = _below(message, step, above)
-            if below is ABSENT:
+            found = below(message, step, above)
+            if found is ABSENT:
                 return ABSENT
-            message, above = below, message
+            message, above = found, message
         return message
 
 
-def _below(value: Any, step: str | int | tuple[str], above: Any) -> Any:
+def below(value: Any, step: str | int | tuple[str], above: Any) -> Any:
+    """Return what is one step below a value, which is itself in `above`; `ABSENT` where there is nothing."""
     if isinstance(step, str):
         # of a plain mapping without asking the abstract one, which takes longer than all else
         return value.get(step, ABSENT) if type(value) is dict or isinstance(value, Mapping) else ABSENT
@@ -67,11 +68,6 @@ def _below(value: Any, step: str | int | tuple[str], above: Any) -> Any:
         if not isinstance(names, list | tuple) or step[0] not in names:
             return ABSENT
         step = names.index(step[0])
-    return entry_of(value, step)
-
-
-def entry_of(value: Any, number: int) -> Any:
-    """Return an entry of a list; `ABSENT` beyond its end, or if it is none."""
     if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__getitem__"):
         return ABSENT
-    return value[number] if number < len(value) else ABSENT
+    return value[step] if step < len(value) else ABSENT

@@ -80,14 +80,20 @@ class PartFile:
         except OSError as error:
             raise write_error(self.path, error) from None
 
-    def commit(self) -> None:
+    def commit(self, *, lasting: bool = True) -> None:
         """Make the file durable and give it its name.
+
+        Args:
+            lasting: it is to outlast a power cut; what need not waits for no disk.
 
         Raises:
             RecordingExistsError: meanwhile another process has written one, and `overwrite` is false.
             WriteError: as of `finish`, or what stands under the unfinished name is not this file any more.
         """
-        self.finish()
+        if lasting:
+            self.finish()
+        else:
+            self.flush()
         try:
             if not self._overwrite and self.path.exists():
                 raise RecordingExistsError(str(self.path))
@@ -97,7 +103,8 @@ class PartFile:
                 self._stream.close()
             self.part.replace(self.path)
             self._stream.close()
-            _sync_folder(self.path.parent)
+            if lasting:
+                _sync_folder(self.path.parent)
         except OSError as error:
             raise write_error(self.path, error) from None
 
@@ -159,7 +166,9 @@ def _remove_left_over(part: Path) -> bool:
         os.close(handle)
 
 
-def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: bool = False) -> Path:
+def write_file(
+    path: Path, data: bytes | str, *, overwrite: bool = True, named: bool = False, lasting: bool = True
+) -> Path:
     """Write a whole file and the folders that it needs, or leave what was there; return its path.
 
     Args:
@@ -168,6 +177,7 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: 
         overwrite: replace what is there.
         named: the user named this very file. Then devices, pipes and links, such as /dev/stdout, are written in place:
             a new file would take their name from them.
+        lasting: see `PartFile.commit`.
 
     Raises:
         RecordingExistsError: the file exists and `overwrite` is false.
@@ -183,7 +193,7 @@ def write_file(path: Path, data: bytes | str, *, overwrite: bool = True, named: 
     file = PartFile(path, overwrite=overwrite)
     try:
         file.write(data)
-        file.commit()
+        file.commit(lasting=lasting)
     except BaseException:
         file.discard()
         raise

@@ -111,7 +111,9 @@ def export(
     if format not in FORMATS:
         raise InvalidValue("format", format, f"must be one of {', '.join(FORMATS)}")
     sources = _sources(recording, tell)
-    for pattern in topics:
+    if not sources:
+        tell(f"{recording.path}: has no topics")
+    for pattern in topics if sources else ():
         if not any(fits(topic, pattern) for topic in sources):
             raise InvalidValue("topic", pattern, f"matches none of {', '.join(sorted(sources))}")
     chosen = [topic for topic in sorted(sources) if any(fits(topic, pattern) for pattern in topics)]

@@ -55,6 +55,10 @@ def check_primitive(primitive: Any) -> None:
     count = element.get("count", "")
     if _tag(element) in ("triangles", "polylist") and count.isdecimal() and len(primitive) < int(count):
         raise ValueError(f"<{_tag(element)}> has count={count[:20]!r}, of which {len(primitive)} are there")
+    if hasattr(primitive, "vcounts"):  # what pycollada makes of more corners than there are grows with their number
+        wanted, there = int(np.sum(primitive.vcounts, dtype=np.int64)), len(primitive.index)
+        if wanted != there:
+            raise ValueError(f"the polygons of a <{_tag(element)}> have {wanted} corners, of which {there} are there")
     for indices in _all(element, "p"):
         found = _LONG.search(indices.text or "")
         if found:

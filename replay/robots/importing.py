@@ -20,6 +20,8 @@ from replay.robots.packages import Packages, given
 from replay.robots.part import RobotPart, make
 
 _MADE = "# SHA-256 of what follows: "
+_MOST_CHANGES = 1000
+"""How many changes are told."""
 
 
 @dataclass(frozen=True)
@@ -195,18 +197,20 @@ def _pose(text: str) -> Origin:
 
 def _alike(changes: Sequence[RobotChange]) -> list[RobotChange]:
     """Return changes with those that say the same of several links or joints as one, the physical ones first."""
-    places: dict[tuple[str, bool], list[str]] = {}
+    places: dict[tuple[str, bool], dict[str, None]] = {}
     for change in changes:
-        found = places.setdefault((change.what, change.physical), [])
-        if change.place not in found:
-            found.append(change.place)
+        places.setdefault((change.what, change.physical), {})[change.place] = None
     merged = []
     for (what, physical), named in places.items():
         kinds = {place.partition(" ")[0] for place in named}
-        shown = named
+        shown = list(named)
         if len(named) > 1 and len(kinds) == 1:
             first, *others = (place.partition(" ")[2] for place in named)
             shown = [f"{kinds.pop()}s {first}", *others]
         more = f", and {len(named) - 8} more" if len(named) > 8 else ""
         merged.append(RobotChange(", ".join(shown[:8]) + more, what, physical))
-    return sorted(merged, key=lambda change: not change.physical)
+    merged.sort(key=lambda change: not change.physical)
+    rest = merged[_MOST_CHANGES:]
+    if rest:
+        merged[_MOST_CHANGES:] = [RobotChange("and more", f"{len(rest)} others are not told", rest[0].physical)]
+    return merged

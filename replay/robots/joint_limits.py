@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -107,8 +106,8 @@ def _has(entry: Node, kind: str) -> bool:
 def _number(entry: Node, key: str) -> float:
     node = entry.child(key)
     value: Any = None if node is None else node.value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _wrong(entry, key, "must be a number")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 10**12:
+        raise _wrong(entry, key, "must be a number between -1e12 and 1e12")
     return float(value)
 
 

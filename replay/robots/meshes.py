@@ -92,7 +92,7 @@ class RobotMeshes:
         content: bytes | Path = path
         if ending == _CONVERTED:
             found = dae_file.read(path, path.read_bytes(), turned=self.turned)
-            content, ending = _stl(found.triangles), ".stl"
+            content, ending = _stl(path, found.triangles), ".stl"
             turned = "" if found.up == "Z_UP" else _on_turning(found.up, self.turned)
             unit = "" if found.unit == 1.0 else f", from units of {found.unit:g} m to metres"
             self.changes.append(RobotChange(f"mesh {path.name}", f"is written as STL{unit}{turned}"))
@@ -137,10 +137,10 @@ def _in_python_package(path: Path) -> str | None:
     return None
 
 
-def _stl(triangles: Floats) -> bytes:
+def _stl(path: Path, triangles: Floats) -> bytes:
     """Return triangles (n, 3, 3) [m] as a binary STL file, in single precision."""
     if float(np.max(np.abs(triangles))) > float(np.finfo(np.float32).max):
-        raise RobotError("mesh", "has coordinates beyond what STL holds")
+        raise RobotError(str(path), "has coordinates beyond what STL holds")
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     rows = np.zeros(len(triangles), record)
     rows["corners"] = triangles

@@ -21,15 +21,17 @@ class RobotNames:
         self._prefix = prefix
         self._called: dict[str, str] = {}
         self._taken: set[str] = set()
+        self._number: dict[str, int] = {}  # of the last one that was called so
 
     def take(self, name: str) -> str:
         """Return what something of a name is called; a name that is taken already gets a number."""
         plain = re.sub(r"[^A-Za-z0-9_.\-]", "_", self._prefix + name)
         plain = re.sub(r"^[.\-]", "_", plain)[: _LONGEST - 8] or "_"
-        called, number = plain, 1
+        called, number = plain, self._number.get(plain, 1)
         while called in self._taken:
             number += 1
             called = f"{plain}_{number}"
+        self._number[plain] = number
         self._taken.add(called)
         self._called.setdefault(name, called)
         return called

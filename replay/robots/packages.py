@@ -70,12 +70,23 @@ class Packages:
             raise element.wrong(f"{written[:200]!r} is a URL; only package:// and files are read")
         path = self._folder / text.removeprefix("file://")
         tree = (self._tree, *self._given.values(), *self._search_path)
-        steps = PurePosixPath(text).parts
-        namesake = next((folder for folder in self._above if len(steps) > 1 and folder.name == steps[0]), None)
-        if namesake is None or ".." in steps or path.is_file() or not namesake.joinpath(*steps[1:]).is_file():
-            return Found(self._existing(path, tree, written, element))
-        found = self._existing(namesake.joinpath(*steps[1:]), (self._tree,), written, element)  # of many robots' folder
-        return Found(found, f"{steps[0]}/ is taken to be {namesake}")
+        for assumed, moved in self._further_up(PurePosixPath(text).parts) if not path.is_file() else ():
+            if moved.is_file():
+                return Found(self._existing(moved, (self._tree,), written, element), assumed)
+        return Found(self._existing(path, tree, written, element))
+
+    def _further_up(self, steps: tuple[str, ...]) -> Iterator[tuple[str, Path]]:
+        """Yield what of a path may be which folder above the description, and the file in it.
+
+        Paths may begin in the folder of many robots, with the name of this one's, or in one above the description's.
+        """
+        if len(steps) < 2 or steps[0] == "/" or ".." in steps:
+            return
+        for folder in self._above:
+            if folder.name == steps[0]:
+                yield f"{steps[0]}/ is taken to be {folder}", folder.joinpath(*steps[1:])
+        for folder in (folder for folder in self._above[1:] if len(folder.parts) > 1):
+            yield f"{steps[0]}/ is taken to be {folder / steps[0]}", folder.joinpath(*steps)
 
     @cached_property
     def _above(self) -> tuple[Path, ...]:

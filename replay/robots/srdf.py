@@ -22,11 +22,13 @@ class Semantics:
     Attributes:
         disabled: the reason by pair of links that need no test.
         states: positions by joint, by the name of the state.
+        unknown: line and tag of the element that first names it, by name of a link that the robot does not have.
         changes: names that the robot does not have, and what is not used.
     """
 
     disabled: dict[Pair, str] = field(default_factory=dict)
     states: dict[str, dict[str, float]] = field(default_factory=dict)
+    unknown: dict[str, tuple[int, str]] = field(default_factory=dict)
     changes: list[RobotChange] = field(default_factory=list)
 
 
@@ -39,6 +41,9 @@ def read(path: Path, data: bytes, robot: Robot) -> Semantics:
     root = parse(path, data, root="robot")
     found = Semantics()
     _read_pairs(root, path, robot, found)
+    for link, (line, tag) in found.unknown.items():
+        rule = f"<{tag}> names {link[:100]!r}, which is no link: left out"
+        found.changes.append(RobotChange(f"line {line} of the SRDF", rule))
     _read_states(root, robot, found)
     known = ("disable_collisions", "disable_default_collisions", "enable_collisions", "group_state", "group")
     others = Counter(child.tag for child in root.children if child.tag not in known)
@@ -66,14 +71,9 @@ def _read_pairs(root: XmlElement, path: Path, robot: Robot, found: Semantics) ->
 
 
 def _known(link: str, links: Mapping[str, object], element: XmlElement, found: Semantics) -> bool:
-    if link in links:
-        return True
-    change = RobotChange(
-        f"line {element.line} of the SRDF", f"<{element.tag}> names {link!r}, which is no link: left out"
-    )
-    if change not in found.changes:
-        found.changes.append(change)
-    return False
+    if link not in links:
+        found.unknown.setdefault(link, (element.line, element.tag))
+    return link in links
 
 
 def _read_states(root: XmlElement, robot: Robot, found: Semantics) -> None:

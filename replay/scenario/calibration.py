@@ -23,7 +23,7 @@ from replay.scenario.model import Scenario
 from replay.scenario.scene import build
 from replay.sensing.calibration import CONFIDENCE, QUANTITIES, Calibration, Quantity, calibrate
 from replay.sensing.capacitive.kind import Capacitive
-from replay.sensing.capacitive.part import ELECTROSTATIC
+from replay.sensing.capacitive.part import ELECTROSTATIC, VACUUM_PERMITTIVITY
 
 _DIGITS = 10
 """Of fitted numbers in a sensor file; the model itself is good to 6."""
@@ -66,7 +66,14 @@ class SensorPath:
         self.method = scene.model.identity()["capacitive"]
         self._column = own.index(self.sensor)
         alone = [replace(found, permittivity=1.0, stray_capacitance=0.0) for found in own]
-        self._suite: Any = Capacitive().suite(alone, scene.targets, method, savings=True)
+        # the points of a curve are no motion: none is between others
+        self._suite: Any = Capacitive().suite(alone, scene.targets, method, savings=method.method not in ELECTROSTATIC)
+        self._found: dict[bytes, Floats] = {}
+
+    @property
+    def computes_charges(self) -> bool:
+        """Whether the model is electrostatics, with the vacuum's permittivity and what the sensor is by itself."""
+        return bool(self.scenario.model.capacitive.method in ELECTROSTATIC)
 
     def integral(self, positions: ArrayLike) -> Floats:
         """Return the sensor's integral (n,) [m] at joint positions (n,) [rad or m]; inf where it is saturated.
@@ -74,6 +81,11 @@ class SensorPath:
         With electrostatics it is what the sensor reads over the vacuum's permittivity, NaN where that is not resolved.
         """
         at = np.asarray(positions, dtype=np.float64)
+        if at.tobytes() not in self._found:
+            self._found[at.tobytes()] = self._integral(at)
+        return self._found[at.tobytes()]
+
+    def _integral(self, at: Floats) -> Floats:
         states = np.repeat(self._start.positions, len(at), axis=0)
         states[:, self._linkage.joint_names.index(self.joint.name)] = at
         states = self._linkage.followed(states)
@@ -201,10 +213,20 @@ def sensor_file(fit: CurveFit) -> str:
             for entry in found.estimates
             if entry.fitted
         ),
-        "The permittivity is a number of this fit, not of a material.",
+        permittivity_said(fit),
         "A scenario includes this file instead of defining the sensor: include: [sensor.yaml]",
     ]
     return "".join(f"# {line}\n" for line in remarks) + stream.getvalue()
+
+
+def permittivity_said(fit: CurveFit) -> str:
+    """Return what the fitted permittivity is."""
+    if not fit.path.computes_charges:
+        return "The permittivity is a number of this fit, not of a material."
+    (found,) = [entry for entry in fit.calibration.estimates if entry.name == "permittivity"]
+    factor, width = found.value / VACUUM_PERMITTIVITY, found.half_width / VACUUM_PERMITTIVITY
+    fitted = f"The permittivity is the vacuum's times an overall factor of {factor:.4g} +- {width:.2g}"
+    return f"{fitted}: 1 where the sensor is as it is drawn."
 
 
 _DIMENSIONS: Mapping[Quantity, Dimension] = {"capacitance": CAPACITANCE, "delta_output": VOLTAGE}

@@ -10,7 +10,7 @@ import numpy as np
 
 from replay.errors import RecordingExistsError
 from replay.logs.part_file import write_file
-from replay.scenario.calibration import CurveFit, sensor_file
+from replay.scenario.calibration import CurveFit, permittivity_said, sensor_file
 from replay.scenario.curve_plot import Line, Panel, draw
 from replay.sensing.calibration import CONFIDENCE, Estimate
 
@@ -29,7 +29,7 @@ def text(fit: CurveFit) -> str:
     ]
     for x, y, fitted in zip(curve.x_values, curve.y_values, found.fitted / fit.unit, strict=True):
         lines.append(f"  {x:>16.6g}{y:>24.6g}{fitted:>14.6g}{y - fitted:>14.3g}")
-    lines.append("the permittivity is a number of this fit, not of a material")
+    lines.append(permittivity_said(fit))
     lines += [f"not pinned down: the interval of {entry.name} holds 0" for entry in found.estimates if _is_loose(entry)]
     return "\n".join(lines)
 

@@ -72,7 +72,7 @@ def _picture(panels: Sequence[Panel], columns: int) -> bytes:
         if panel.logarithmic:
             axis.set_xscale("log")
             axis.set_yscale("log")
-        axis.set(title=_plain(panel.title), xlabel=_plain(panel.x), ylabel=_plain(panel.y))
+        axis.set(title=_plain(panel.title, keep="\n"), xlabel=_plain(panel.x), ylabel=_plain(panel.y))
         axis.grid(visible=True, alpha=0.3)
         axis.legend(fontsize="small")
     for axis in axes[len(panels) :]:
@@ -82,6 +82,6 @@ def _picture(panels: Sequence[Panel], columns: int) -> bytes:
     return picture.getvalue()
 
 
-def _plain(text: str) -> str:
-    """Return text of others for a drawing, in which dollars would begin a formula."""
-    return printable(text).replace("$", r"\$")
+def _plain(text: str, *, keep: str = "") -> str:
+    """Return text of others for a drawing, in which dollars would begin a formula; `keep` as of `printable`."""
+    return printable(text, keep=keep).replace("$", r"\$")

@@ -20,6 +20,7 @@ from replay.scenario.include import ScenarioText
 from replay.scenario.methods import BUILTIN_MODELS, Model, builtin_model
 from replay.scenario.model import Scenario
 from replay.scenario.names import Names
+from replay.scenario.notes import sensor_faults
 from replay.scenario.problems import translate
 from replay.scenario.script import motion_problems
 from replay.scenario.sensors import Sensors
@@ -204,6 +205,7 @@ class _File:
         if scenario is None:
             raise ScenarioError(_in_order(problems))
         scenario._provenance = provenance
+        problems.extend(sensor_faults(scenario, scenario.model))
         recorded = None
         if scenario.motion.recorded is not None:
             recorded = _read_log(self._library, self._text, root, scenario, problems)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 from replay.errors import Problem, count
@@ -62,19 +63,34 @@ def notes(
     return found
 
 
+def sensor_faults(scenario: Scenario, model: Model) -> list[Problem]:
+    """Return what of the sensors a model cannot compute, each with its place."""
+    return [
+        scenario.provenance.problem(("sensors", kind.name, *path), rule)
+        for kind in KINDS.values()
+        for path, rule in kind.faults(
+            scenario.sensors.of(kind.name), partial(_felt, scenario, kind.name), getattr(model, kind.name)
+        )
+    ]
+
+
+def _felt(scenario: Scenario, kind: str) -> dict[str, list[str]]:
+    """Return the links that each sensor of a kind senses."""
+    sensed = [name for name, link in scenario.links.items() if any(shape.sense for shape in link.shapes.values())]
+    return {
+        name: [
+            link
+            for link in sensed
+            if link != sensor.link and not any(matches(pattern, link) for pattern in sensor.ignore)
+        ]
+        for name, sensor in scenario.sensors.of(kind).items()
+    }
+
+
 def _sensor_notes(scenario: Scenario, model: Model) -> Iterator[Problem]:
     earth = {name: link.earth for name, link in scenario.links.items()}
-    sensed = [name for name, link in scenario.links.items() if any(shape.sense for shape in link.shapes.values())]
     for kind in KINDS.values():
-        written = scenario.sensors.of(kind.name)
-        felt = {
-            name: [
-                link
-                for link in sensed
-                if link != sensor.link and not any(matches(pattern, link) for pattern in sensor.ignore)
-            ]
-            for name, sensor in written.items()
-        }
+        written, felt = scenario.sensors.of(kind.name), _felt(scenario, kind.name)
         for path, rule in kind.notes(written, felt, earth, getattr(model, kind.name)):
             yield scenario.provenance.problem(("sensors", kind.name, *path), rule)
 

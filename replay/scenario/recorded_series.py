@@ -69,15 +69,7 @@ def in_window(path: KeyPath, series: Series, window: Window) -> Series:
     time = series.time
     steps = np.diff(time)
     if (steps <= 0).any():
-        at = _first(steps <= 0)
-        rule = "has times in the log that do not increase"
-        if window.published and steps[at] == 0 and not time[:-1][steps == 0].any():
-            raise Unusable(path, "has samples in the log that differ and are all stamped 0, as before a clock is there")
-        if steps[at] == 0 and window.published:
-            both = " and ".join(_value(value) for value in series.value[at : at + 2])
-            rule = f"is moved by several publishers: at {window.shown(time[at])} it is {both}; {_WAY_OUT}"
-            raise Unusable(path, rule)
-        raise Unusable(path, f"{rule}: after {window.shown(time[at])} comes {window.shown(time[at + 1])}")
+        raise Unusable(path, _disorder(path, series, window, steps))
     begin = max(int(np.searchsorted(time, window.begin, side="right")) - 1, 0)
     end = min(int(np.searchsorted(time, window.end)) + 1, len(time))
     cut = Series(time[begin:end], series.value[begin:end], series.row[begin:end])
@@ -91,6 +83,22 @@ def in_window(path: KeyPath, series: Series, window: Window) -> Series:
         gap = f"a gap of {np.diff(cut.time)[at] * 1e-9:.6g} s in the log at {window.shown(cut.time[at])}"
         raise Unusable(path, f"has {gap}; raise max_gap to bridge it in a straight line")
     return cut
+
+
+def _disorder(path: KeyPath, series: Series, window: Window, steps: Integers) -> str:
+    """Return what is wrong with a series whose times do not increase."""
+    time = series.time
+    at = _first(steps <= 0)
+    if window.published and steps[at] == 0:
+        if not time[:-1][steps == 0].any():
+            return "has samples in the log that differ and are all stamped 0, as before a clock is there"
+        both = " and ".join(_value(value) for value in series.value[at : at + 2])
+        return f"is moved by several publishers: at {window.shown(time[at])} it is {both}; {_WAY_OUT}"
+    if window.published and steps.min() >= -OFTEN:  # messages that overtake each other; else a clock that was set
+        order = np.argsort(time, kind="stable")
+        check_turns(path, time[order], series.value[order, :3] if series.value.ndim > 1 else series.value[order])
+    before, after = map(window.shown, time[at : at + 2])
+    return f"has times in the log that do not increase: after {before} comes {after}"
 
 
 _WAY_OUT = "channel and frame_id do not tell them apart: record one alone, or each on a topic of its own"

@@ -25,7 +25,7 @@ from replay.scenario.load import load_model
 from replay.scenario.methods import Model
 from replay.scenario.model import Scenario
 from replay.scenario.names import matches
-from replay.scenario.notes import notes, piece_notes
+from replay.scenario.notes import notes, piece_notes, sensor_faults
 from replay.scenario.script import linkage, script
 from replay.sensing.kinds import KINDS, of_kind
 from replay.sensing.signal.chain import Chain, Signals
@@ -141,9 +141,12 @@ def build(scenario: Scenario, *, model: Model | str | Path | None = None, saving
 
     Raises:
         ScenarioError: a mesh cannot be used, a shape needs too many triangles, an expectation is about a pair that is
-            not tested, or the model's file is not valid; each with its place.
+            not tested, the model cannot compute the sensors, or its file is not valid; each with its place.
     """
     model = load_model(model) if isinstance(model, str | Path) else model or scenario.model
+    faults = sensor_faults(scenario, model)
+    if faults:
+        raise ScenarioError(faults)
     machine = linkage(scenario)
     scene_shapes, mesh_notes = _shapes(scenario, machine)
     bodies, pairs = _collision(scenario, machine, scene_shapes)

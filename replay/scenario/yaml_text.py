@@ -68,7 +68,9 @@ def _parse(data: bytes, file: str, problems: list[Problem]) -> Node | None:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         column = error.start - data.rfind(b"\n", 0, error.start)
-        found = f"byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        known = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        found = "UTF-16 text" if known else f"byte 0x{data[error.start]:02x} is not UTF-8"
+        found += "; save the file as UTF-8"
         problems.append(Problem(found, file=file, line=line, column=column))
         return None
     try:

@@ -197,6 +197,12 @@ class SensorKind(ABC):
         """Return a sensor that knows the shapes of its own link: triangles (n, 3, 3) [m] by name; most need none."""
         return sensor
 
+    def faults(
+        self, parts: Mapping[str, Any], felt: Callable[[], Mapping[str, Sequence[str]]], method: Any
+    ) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Yield what of sensors as they are written a method cannot compute; as `notes`, `felt` asked if it matters."""
+        yield from ()
+
     def notes(
         self, parts: Mapping[str, Any], felt: Mapping[str, Sequence[str]], earth: Mapping[str, float], method: Any
     ) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -1,5 +1,7 @@
 """Families of logs that do not tell their clock: each is refused, whatever noise, rate and place are."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -122,7 +124,64 @@ def a_log_that_begins_or_ends_beside_the_motion(rng):
     return [measured(rng, lambda t: hill(np.clip(t, 0.0, 6.0)), log_times(rng, begin, end, offset), offset)]
 
 
+def bump(t, at=3.0, width=0.5):
+    return np.exp(-(((t - at) / width) ** 2)) - 0.4 * np.exp(-(((t - at - 1.1) / 0.6 / width) ** 2))
+
+
+def done_twice(rng, jitter=0.0, wander=0.0, noise=0.0):
+    """Return a log of 16 s that holds the motion twice, at two amplitudes, with errors that grow with it or do not."""
+    time = np.cumsum(rng.uniform(0.5, 1.5, 1600)) * rng.uniform(0.005, 0.01)
+    time *= 16.0 / time[-1]
+    heights, read = rng.permutation([1.0, rng.uniform(0.15, 1.0)]), time + jitter * rng.normal(size=len(time))
+    slow = [1.0 + wander * np.sin(rng.uniform(1.0, 4.0) * time + rng.uniform(0.0, 6.0)) for _ in heights]
+    value = heights[0] * bump(read) * slow[0] + heights[1] * bump(read - 8.0) * slow[1]
+    return [SignalPair("/a", FRAMES, bump(FRAMES), time, value + noise * rng.normal(size=len(time)))]
+
+
+def a_motion_done_again_at_another_amplitude(rng):
+    return done_twice(rng, noise=rng.choice([0.001, 0.01, 0.05]))
+
+
+def a_motion_done_again_with_jitter(rng):
+    return done_twice(rng, jitter=rng.choice([0.002, 0.01, 0.03]), noise=1e-4)
+
+
+def a_motion_done_again_and_not_as_well(rng):
+    return done_twice(rng, wander=rng.uniform(0.02, 0.1), noise=1e-3)
+
+
+def one_of_two_corners_between_frames(rng):
+    """A triangle that is there twice: where its corners are between frames differs."""
+    width, height, offset = rng.uniform(0.1, 0.6), rng.uniform(0.15, 1.0), rng.uniform(-1.0, 1.0)
+    begins = rng.uniform(1.0, 1.6), rng.uniform(4.0, 4.9)
+    motion = lambda t: sum(  # noqa: E731
+        h * np.maximum(1.0 - np.abs(t - at) / width, 0.0) for h, at in zip((1.0, height), begins, strict=True)
+    )
+    at = rng.choice(begins)
+    return [measured(rng, motion, log_times(rng, at - 0.9, at + 0.9, offset), offset, noise=(0.01, 0.1, 0.3))]
+
+
+def one_of_two_jumps(rng):
+    begins, offset = (rng.uniform(0.8, 1.5), rng.uniform(3.6, 4.6)), rng.uniform(-0.5, 0.5)
+    at = rng.choice(begins)
+    jump = lambda t: (t > begins[0]) + 1.7 * (t > begins[1])  # noqa: E731
+    return [measured(rng, jump, log_times(rng, at - 0.9, at + 0.9, offset), offset)]
+
+
+def stairs(rng):
+    period, offset = rng.uniform(0.5, 1.2), rng.uniform(-0.2, 0.2)
+    return [measured(rng, lambda t: np.floor(t / period), log_times(rng, 1.0, 5.0, offset), offset)]
+
+
+DONE_TWICE = (
+    a_motion_done_again_at_another_amplitude,
+    a_motion_done_again_with_jitter,
+    a_motion_done_again_and_not_as_well,
+    one_of_two_corners_between_frames,
+    one_of_two_jumps,
+)
 FAMILIES = (
+    *DONE_TWICE,
     a_ramp_beside_a_curve,
     a_ramp_out_of_a_motion_with_corners,
     a_decay_that_is_itself_again_later,
@@ -136,14 +195,16 @@ FAMILIES = (
     another_smooth_signal,
     a_gap_where_all_happens,
     a_log_that_begins_or_ends_beside_the_motion,
+    stairs,
 )
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_what_does_not_tell_its_clock_is_refused(family):
+    bound = 20.0 if family in DONE_TWICE else 2.5
     for seed in SEEDS:
         pairs = family(np.random.default_rng(seed))
-        found = estimate_clock(pairs, drift=family is a_period_with_a_drift, lowest=-2.5, highest=2.5)
+        found = estimate_clock(pairs, drift=family is a_period_with_a_drift, lowest=-bound, highest=bound)
         assert isinstance(found, Undetermined), (seed, found)
 
 
@@ -182,3 +243,41 @@ def test_what_tells_little_is_told_within_a_frame_of_its_interval_or_not_at_all(
         if isinstance(found, ClockEstimate):
             low, high = found.offset_interval
             assert low - 1.0 / 60.0 <= offset <= high + 1.0 / 60.0
+
+
+def jump(rng):
+    at = rng.uniform(2.0, 4.0)
+    return lambda t: (t > at).astype(float)
+
+
+def pulse(rng):
+    at, lasts = rng.uniform(1.0, 3.0), rng.uniform(0.02, 1.5)
+    return lambda t: (t > at).astype(float) - (t > at + lasts)
+
+
+def two_jumps(rng):
+    first, second = rng.uniform(0.8, 2.5), rng.uniform(2.7, 4.6)
+    return lambda t: (t > first).astype(float) + (t > second)
+
+
+def jumps_as_far_from_frames(rng):
+    """As those of a script at round times are."""
+    times = rng.choice(np.arange(30, 330), 8, replace=False) / 60.0 + rng.uniform(0.0, 1.0 / 60.0)
+    heights = rng.normal(size=8)
+    return lambda t: sum(height * (t > at) for height, at in zip(heights, times, strict=True))
+
+
+@pytest.mark.parametrize("steps", [False, True], ids=["values", "states"])
+@pytest.mark.parametrize("family", [jump, pulse, two_jumps, jumps_as_far_from_frames])
+def test_jumps_are_told_to_a_frame_and_a_sample_or_not_at_all(family, steps):
+    told = []
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        offset, motion = rng.uniform(-0.5, 0.5), family(rng)
+        pair = measured(rng, motion, log_times(rng, 0.02, 5.98, offset), offset, noise=(0.0, 0.003, 0.03))
+        found = estimate_clock([dataclasses.replace(pair, steps=steps)], drift=False, lowest=-2.5, highest=2.5)
+        if isinstance(found, ClockEstimate):
+            low, high = found.offset_interval
+            assert low <= offset <= high, (seed, offset, found)
+            told.append(high - low)
+    assert np.median(told or [0.0]) < 0.1

@@ -93,6 +93,6 @@ def test_settings_that_libraries_look_for_there_change_nothing(tmp_path):
 def test_a_checkout_is_found_where_it_is_the_current_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", ["", str(tmp_path), "/somewhere", str(ROOT)])
     monkeypatch.chdir(tmp_path)
-    assert import_path(behave) == ["/somewhere", str(ROOT)]
+    assert import_path(behave.__module__) == ["/somewhere", str(ROOT)]
     monkeypatch.chdir(ROOT)
-    assert import_path(behave) == [str(ROOT), str(tmp_path), "/somewhere", str(ROOT)]
+    assert import_path(behave.__module__) == [str(ROOT), str(tmp_path), "/somewhere", str(ROOT)]

@@ -19,12 +19,16 @@ def test_shards_are_put_together_as_the_night_that_they_are_parts_of(tmp_path, c
     parts = [tmp_path / f"part_{k}" for k in (1, 2)]
     for k, part in enumerate(parts, start=1):
         night(tmp_path, part, "--rrd", "none", "--shard", f"{k}/2")
+    for folder in (path for part in parts for path in part.iterdir() if path.is_dir()):
+        (folder / "mine").mkdir()  # not the night's, and neither is what a link leads to
+        (folder / "linked.txt").symlink_to(tmp_path / "in" / "plain_0.yaml")
     merged = tmp_path / "merged"
     history = tmp_path / "history.jsonl"
     capsys.readouterr()
     merge = ["merge", *map(str, parts), "-o", str(merged), "--history", str(history)]
     assert run(merge) is ExitCode.FAILED
     assert "4 scenarios: " in capsys.readouterr().out
+    assert not [*merged.rglob("mine"), *merged.rglob("linked.txt")]
     assert verdicts_of(merged) == verdicts_of(whole)
     assert junit_of(merged) == junit_of(whole)
     messages = [row["message"] for row in rows_of(whole).values()]

@@ -25,6 +25,24 @@ def test_a_folder_stands_for_its_scenarios_but_not_for_their_parts(folder):
     assert find_scenarios([folder / "b.yaml", folder]) == [folder / "b.yaml", folder / "parts" / "a.yml"]
 
 
+AS_WRITTEN = {
+    "with a mark": SCENARIO.encode("utf-8-sig"),
+    "for old machines": SCENARIO.replace("\n", "\r").encode(),
+    "a document": b"%YAML 1.2\n--- # of ours\n" + SCENARIO.encode(),
+    "quoted": SCENARIO.replace("version", '"version"').encode(),
+    "json": b'# as a tool wrote it\n{"name": "near", "version": 1}',
+    "a line": b"{name: near, version: 1}",
+    "UTF-16": SCENARIO.encode("utf-16"),
+}
+
+
+@pytest.mark.parametrize("way", AS_WRITTEN)
+def test_a_scenario_of_a_folder_is_found_however_it_is_written(tmp_path, way):
+    (tmp_path / "a.yaml").write_bytes(AS_WRITTEN[way])
+    (tmp_path / "part.yaml").write_bytes(b"#" * 100_000 + b"\n{links: {tool: {shapes: {}}}}")
+    assert find_scenarios([tmp_path]) == [tmp_path / "a.yaml"]
+
+
 def test_paths_that_stand_for_nothing_are_refused(folder):
     with pytest.raises(InvalidValue, match="is not there"):
         find_scenarios([folder / "none.yaml"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from replay.bench import distance
-from replay.bench.cone_truth import nearest_in_cone
+from replay.bench.cone_truth import SAMPLES, nearest_in_cone
 from replay.bench.inputs import box_surface, torus
 from replay.geometry.solid import signed_volume
 
@@ -42,6 +42,11 @@ def test_the_reference_knows_a_plane_a_border_and_an_edge():
     slope = np.array([[[-50.0, -50.0, -48.0], [50.0, -50.0, -48.0], [0.0, 50.0, 52.0]]])  # z = 2 + y
     border = 2.0 / (math.cos(half) + math.sin(half))
     assert nearest_in_cone(slope, np.zeros(3), up, 2.0 * half) == pytest.approx(border, rel=1e-15)
+    half_turn, sample = math.pi, 2.0 * math.pi / SAMPLES
+    for turn in (0.3, *(half_turn + share * sample for share in (-0.7, -0.5, -0.3, 0.3, 0.5, 0.7))):
+        c, s = math.cos(turn), math.sin(turn)
+        turned = slope @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        assert nearest_in_cone(turned, np.zeros(3), up, 2.0 * half) == pytest.approx(border, rel=1e-14)
     aside = square + np.array([100.0, 0.0, 0.0])
     assert nearest_in_cone(aside, np.zeros(3), up, 2.0 * half) == math.inf
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import replay
-from replay.bench.experiments import measured, prediction, splitting
-from replay.bench.experiments.measured import DELTA, DELTA_STRAY, PLATES, SELF, SELF_STRAY, SMALL, Bench
+from replay.bench.experiments import conductors, measured, prediction, splitting
+from replay.bench.experiments.measured import DELTA, DELTA_STRAY, FIELD, LONG, PLATES, SELF, SELF_STRAY, SMALL, Bench
 from replay.cli.exit_codes import ExitCode
 from replay.cli.main import run
 
@@ -80,6 +80,40 @@ def test_a_pivoting_plate_of_the_fitted_size_is_predicted_well_up_to_60_degrees(
     assert (other_size.deviation < -0.15).all()
 
 
+@pytest.mark.parametrize("reading", [SELF, DELTA_STRAY], ids=lambda reading: reading.name)
+@pytest.mark.parametrize("plate", [SMALL, LONG], ids=lambda plate: plate.name)
+def test_electrostatics_needs_no_factor_and_predicts_every_size_and_angle(plate, reading):
+    found = prediction.fit(BENCH, plate, reading, model=FIELD).calibration
+    assert found.permittivity == pytest.approx(8.8542e-12, rel=3e-3)
+    assert found.stray_capacitance == pytest.approx(reading.stray * measured.PICOFARAD, rel=3e-3)
+    several = [prediction.predict_parallel(BENCH, plate, reading, side, model=FIELD) for side in (10, 30)]
+    if plate is SMALL:
+        several += [prediction.predict_pivot(BENCH, plate, reading, *sides, model=FIELD) for sides in prediction.PIVOTS]
+    for entry in several:
+        assert np.abs(entry.deviation).max() < 5e-3
+        assert entry.worst_of_range < 0.02
+
+
+def test_a_hand_over_one_sensor_moves_the_one_beside_it_more_when_both_are_driven():
+    (table,), (panel,) = conductors.run_neighbours(FOLDER)
+    first, *_, last = table.rows
+    assert len(panel.lines) == len(last) - 1
+    assert all(value == 0.0 for name, value in first.items() if name != "distance_cm")
+    assert last["covered, alone [mV]"] > 3.0 * last["neighbour, alone [mV]"] > 0.0
+    for row in table.rows[1:]:
+        assert row["neighbour, together [mV]"] > row["neighbour, alone [mV]"]
+        assert row["covered, together [mV]"] > row["covered, alone [mV]"]
+
+
+def test_a_person_reads_more_the_better_he_is_earthed():
+    (table,), _ = conductors.run_person(FOLDER)
+    assert [row["distance_cm"] for row in table.rows] == [50.0, 20.0, 10.0, 5.0, 3.0, 2.0, 1.0]
+    for row in table.rows:
+        assert 0.0 < row["floating [pF]"] < row["100 pF [pF]"] < row["grounded [pF]"] < row["thesis [pF]"]
+    shares = [row["floating [pF]"] / row["grounded [pF]"] for row in table.rows]
+    assert shares[0] < shares[1] < shares[2] < min(shares[3:]), "far away his earth matters most"
+
+
 def test_the_measured_curves_are_those_of_the_scenarios():
     for name in ("parallel_10cm", "parallel_20cm", "parallel_30cm", "pivot_10cm", "pivot_20cm"):
         sensors = replay.load(FOLDER / f"{name}.yaml").sensors.capacitive
@@ -92,6 +126,15 @@ def test_the_measured_curves_are_those_of_the_scenarios():
         target = replay.load(FOLDER / f"pivot_{side}cm.yaml").links["target"]
         assert target.pose.xyz == (0.0, 0.0, centre / 100)
         assert target.shapes["plate"].size == (side / 100, side / 100)
+
+
+def test_fits_are_drawn_of_the_plates_without_a_back():
+    _, panels = prediction.run_fit(FOLDER)
+    assert [panel.title for panel in panels] == [
+        f"II. {plate} cm sensor, 20 cm plate\n{reading.name}"
+        for reading in (SELF, DELTA_STRAY)
+        for plate in ("5 x 5", "4 x 20")
+    ]
 
 
 def test_the_command_writes_tables_and_drawings(tmp_path, capsys):

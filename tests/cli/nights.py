@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import zlib
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,9 +21,14 @@ def verdicts_of(folder):
     return {name: entry["verdict"] for name, entry in json.loads((folder / "run.json").read_text())["verdicts"].items()}
 
 
+@lru_cache(maxsize=1)
+def _schema():
+    return xmlschema.XMLSchema(XSD)
+
+
 def junit_of(folder):
     """Return the verdicts of a valid junit.xml: pass, failure, error or skipped by name."""
-    xmlschema.XMLSchema(XSD).validate(str(folder / "junit.xml"))
+    _schema().validate(str(folder / "junit.xml"))
     (suite,) = ElementTree.parse(folder / "junit.xml").getroot()
     cases = {case.get("name"): (case[0].tag if len(case) else "pass") for case in suite.iter("testcase")}
     for tag, attribute in (("failure", "failures"), ("error", "errors"), ("skipped", "skipped")):
@@ -41,9 +47,10 @@ def rows_of(folder):
     }
 
 
-def night(folder, output, *more):
-    base = ["--baseline", str(folder / "base"), "-o", str(output)]
-    return run(["regress", str(folder / "in"), *base, "--workers", "2", "--memory", "600MiB", *map(str, more)])
+def night(folder, output, *more, workers=1):
+    """Run the command; a worker more takes longer to begin than a few of these scenarios take."""
+    base = ["--baseline", str(folder / "base"), "-o", str(output), "--workers", str(workers), "--memory", "600MiB"]
+    return run(["regress", str(folder / "in"), *base, *map(str, more)])
 
 
 def prepare(folder, plain, bad, differing):

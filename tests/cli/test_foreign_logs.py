@@ -208,6 +208,19 @@ def test_a_topic_whose_messages_are_not_what_its_schema_says_is_written_as_bytes
     }
 
 
+def test_a_log_without_topics_is_told_as_one(tmp_path, capsys):
+    path = tmp_path / "empty.mcap"
+    path.write_bytes(build(Stored({}, {}, [], {"note": b"hello"}, {}), ()))
+    assert run(["info", str(path)]) == ExitCode.FINE
+    capsys.readouterr()
+    for form, files in (("csv", 0), ("json", 1), ("parquet", 0)):
+        assert run(["export", str(path), "--format", form, "-o", str(tmp_path / form)]) == ExitCode.FINE
+        told = capsys.readouterr()
+        assert len(told.out.splitlines()) == files
+        assert "has no topics" in told.err
+    assert json.loads((tmp_path / "json" / "empty.json").read_text())["topics"] == {}
+
+
 def test_a_pointer_of_git_lfs_is_told_as_one(tmp_path, capsys):
     path = tmp_path / "log.mcap"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a21\nsize 12345\n")

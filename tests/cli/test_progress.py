@@ -3,11 +3,12 @@
 import io
 import re
 import sys
+import threading
 
 import pytest
 
 from replay.batch.case import CaseResult, CaseStatus
-from replay.cli import terminal
+from replay.cli import interruption, terminal
 from replay.cli.progress import RunProgress
 from replay.numerics.compiling import Compiling
 
@@ -45,6 +46,27 @@ def test_a_log_has_a_line_every_few_seconds_and_one_for_each_scenario_that_fails
     assert lines[-1].startswith("replay: [1000/1000] s999: passed in 0.1 s")
     assert [line.split()[2] for line in lines if "broken" in line] == ["s100:", "s500:"]
     assert len(lines) < 20
+
+
+@pytest.mark.parametrize(
+    "tell",
+    [
+        lambda progress: progress.plan({"a": 1.0}),
+        lambda progress: progress.prepare(Compiling(1, 9, 2.0)),
+        lambda progress: progress.follow("a", 1, 2),
+        lambda progress: progress.done(CaseResult("a", CaseStatus.PASSED, seconds=0.1)),
+        lambda progress: progress.compare("a"),
+        lambda progress: progress.check(),
+    ],
+    ids=["plan", "prepare", "follow", "done", "compare", "check"],
+)
+def test_a_request_to_stop_that_native_code_lost_ends_a_run_at_the_next_news(monkeypatch, tell):
+    requested = threading.Event()
+    monkeypatch.setattr(interruption, "_requested", requested)
+    with RunProgress() as progress:
+        requested.set()
+        with pytest.raises(KeyboardInterrupt):
+            tell(progress)
 
 
 def clock(monkeypatch, *times):

@@ -20,7 +20,7 @@ def check_night(tmp_path, monkeypatch, *, plain, bad, differing):
     prepare(tmp_path, plain, bad, differing)
     monkeypatch.setattr("replay.batch.run.run_case", scenes.misbehave)
     out = tmp_path / "night"
-    assert night(tmp_path, out, "--timeout", "6s") is ExitCode.FAILED
+    assert night(tmp_path, out, "--timeout", "6s", workers=2) is ExitCode.FAILED
     check_verdicts(out, plain, bad, differing)
     assert {process.pid for process in psutil.Process().children(recursive=True)} == before
     for kind in ("crash", "hang", "eat"):

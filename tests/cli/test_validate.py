@@ -43,6 +43,23 @@ def test_validate_deep_counts_what_would_be_simulated(scenario, capsys):
     assert (entry["pairs"], entry["triangles"], entry["distance_sensors"]) == (1, 24, 1)
 
 
+def test_validate_deep_tells_of_meshes_too_and_nothing_twice(tmp_path, capsys):
+    (tmp_path / "leaf.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    path = tmp_path / "leaf.yaml"
+    path.write_text(
+        "version: 1\nname: leaf\nrate: 10\nduration: 1\n"
+        "links: {a: {joint: {type: prismatic, axis: [1, 0, 0], lower: 0, upper: 1}, "
+        "shapes: {m: {type: mesh, file: leaf.obj, scale: 1}}}}\n"
+        "motion: {points: {a: [{time: 0, position: 0}, {time: 3, position: 1}]}}\n"
+    )
+    said = []
+    for deep in ([], ["--deep"]):
+        assert run(["validate", str(path), *deep]) is ExitCode.FINE
+        said.append(capsys.readouterr().err)
+    assert [text.count("after the scenario's end") for text in said] == [1, 1]
+    assert [text.count("3 edges are open") for text in said] == [0, 1]
+
+
 def test_an_unusable_mesh_is_invalid_input_and_fails_one_of_many(tmp_path, capsys):
     (tmp_path / "cut.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n0\n")
     path = tmp_path / "bad.yaml"

@@ -37,10 +37,13 @@ def run_boxes(n, seed):
     return _boxes(bodies, halves, which, rotations, positions, gjk_exact.workspace())
 
 
+_precise_points = numba.njit(gjk_exact.precise_points)
+
+
 @numba.njit
 def _boxes(bodies, halves, which, rotations, positions, work):
     hits, wrong, undecided = 0, 0, 0
-    precise = gjk_exact.precise_points()
+    precise = _precise_points()
     for k in range(len(which)):
         i, j = which[k]
         size = 2.0 * (np.abs(positions[k]).max() + halves[i].max() + halves[j].max())
@@ -90,7 +93,7 @@ def run_hulls(n, seed):
 
 @numba.njit
 def _query(bodies, i, j, rotation, translation, size, work):
-    precise = gjk_exact.precise_points()
+    precise = _precise_points()
     return gjk_kernel.query(bodies, i, bodies, j, rotation, translation, size, np.inf, 0.0, work, precise)
 
 
@@ -146,7 +149,7 @@ def test_tables_find_what_looking_at_every_vertex_finds():
 
 @numba.njit
 def _pair(a, b, rotation, translation, size, cutoff, work):
-    precise = gjk_exact.precise_points()
+    precise = _precise_points()
     return gjk_kernel.query(a, 0, b, 0, rotation, translation, size, cutoff, 0.0, work, precise)
 
 

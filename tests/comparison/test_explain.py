@@ -119,3 +119,11 @@ def test_the_closest_triangles_are_those_of_all_pairs(seed):
     assert every[found.triangles] == pytest.approx(every.min(), rel=1e-12, abs=1e-15)
     if found.gap > 0.0:
         assert np.linalg.norm(found.points[0] - found.points[1]) == pytest.approx(found.gap, rel=1e-9)
+
+
+def test_a_long_triangle_is_closest_by_its_tip():
+    small = np.array([[0.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+    long = np.array([[-7.0, 0.0, 0.0], [5.0, 1.0, 0.0], [5.0, -1.0, 0.0]])
+    found = closest_triangles(np.stack([small - [6.0, 0.0, 0.0], long]), small[None] - [20.0, 0.0, 0.0])
+    assert found.gap == pytest.approx(13.0, rel=1e-12) and found.triangles == (1, 0)
+    np.testing.assert_allclose(found.points, [[-7.0, 0.0, 0.0], [-20.0, 0.0, 0.0]], atol=1e-12)

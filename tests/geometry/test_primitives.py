@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from replay.errors import InvalidValue
 from replay.geometry import primitives
-from replay.geometry.convex import convex_sets
+from replay.geometry.convex import convex_sets, from_pieces
 from replay.geometry.solid import Solid, signed_volume
 from replay.numerics import transforms
 from tests.amounts import cases
@@ -204,3 +204,17 @@ def test_convex_sets_cover_the_solid(name: str) -> None:
             for direction in np.random.default_rng(k).normal(size=(30, 3)):
                 best = np.max(vertices @ direction)
                 assert best == pytest.approx(np.max(expected @ direction), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "size", [(1.0, 1.0, 1.0), (3.0, 1e-3, 0.2), (1e-9, 2.0, 1.0), (1e150, 1e130, 1e150), (1.0, 2.0)]
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_corners_that_are_said_to_be_extreme_are(size, turned):
+    solid = primitives.cuboid(size) if len(size) == 3 else primitives.plane(size)
+    if turned:
+        solid = solid.transformed(transforms.from_quaternion(np.array([0.1, 0.7, -0.3, 0.4])))
+    assert solid.strictly_convex
+    said, found = convex_sets(solid), from_pieces(solid.pieces)
+    np.testing.assert_array_equal(said.vertices, found.vertices)
+    np.testing.assert_array_equal(said.first, found.first)

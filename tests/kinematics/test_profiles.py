@@ -67,6 +67,31 @@ def test_extremes_are_those_of_a_fine_sampling(derivative, seed):
     assert min(times) >= 1.0 and max(times) <= 5.5
 
 
+@pytest.mark.parametrize(
+    ("derivative", "row"), [(0, [0.0, 1.0, -1.0]), (1, [0.0, 0.0, 1.5, -1.0]), (2, [0.0, 0.0, 0.0, 0.5, -0.5])]
+)
+def test_a_parabola_has_its_extreme_at_its_vertex(derivative, row):
+    profile = from_pieces([[2.0, 3.0, *row, *[0.0] * (6 - len(row))]], 0.0, row[0])
+    vertex = {0: (2.5, 0.25), 1: (2.5, 0.75), 2: (2.25, 0.375)}[derivative]
+    assert max(profile.extremes(derivative), key=lambda found: found[1]) == pytest.approx(vertex, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rising_and_falling_parts_are_the_whole_way(seed):
+    profile = two_pieces(np.random.default_rng(seed))
+    parts = profile.by_direction()
+    spans = sorted((a, b) for part in parts for a, b in zip(part.start.tolist(), part.end.tolist(), strict=True))
+    assert [spans[0][0], spans[-1][1]] == [1.0, 5.5]
+    assert all(b == c or (b, c) == (3.0, 4.0) for (_, b), (c, _) in itertools.pairwise(spans))
+    for part, sign in zip(parts, (1.0, -1.0), strict=True):
+        for start, end in zip(part.start, part.end, strict=True):
+            times = np.linspace(start, end, 50)[1:-1]
+            (position, velocity), (of_all, speed) = part.sample(times), profile.sample(times)
+            np.testing.assert_allclose(position, of_all, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(velocity, speed, rtol=1e-9, atol=1e-9)
+            assert (sign * speed > -1e-12).all()
+
+
 def test_samples_are_joined_by_straight_lines():
     profile = through_samples(np.array([1.0, 2.0, 4.0]), np.array([0.0, 3.0, -1.0]))
     position, velocity = profile.sample(np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0]))

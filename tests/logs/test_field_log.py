@@ -77,6 +77,21 @@ def test_entries_of_a_list_are_read_alike_whatever_other_messages_hold(odd):
         np.testing.assert_array_equal(series[place].value, [float(words.get(value, value)) for value in values])
 
 
+@pytest.mark.parametrize(
+    "odd", [{}, {"a": 1.5}, {"a": 1.5, "b": None, "c": "NaN"}, {"a": 1, "b": True, "c": 2**70}, [1, 2]]
+)
+def test_fields_of_a_mapping_are_read_alike_whatever_other_messages_hold(odd):
+    plain = [(10 * k, {"d": {"a": 0.5 * k, "b": 1.5 * k, "c": k}}) for k in range(1, 5)]
+    mixed = [*plain, (50, {"d": odd}), (60, {}), (70, {"d": 7.0})]
+    series = fields(json_log(*mixed), *(("/a", f"d.{name}") for name in "abc")).series
+    words = {"NaN": np.nan, None: np.nan}
+    for name in "abc":
+        there = [(t, body["d"]) for t, body in mixed if isinstance(body.get("d"), dict) and name in body["d"]]
+        assert series["/a", f"d.{name}"].time.tolist() == [t for t, _ in there]
+        expected = [float(words.get(d[name], d[name])) for _, d in there]
+        np.testing.assert_array_equal(series["/a", f"d.{name}"].value, expected)
+
+
 def test_of_long_lists_the_entries_that_are_asked_for_are_kept():
     """All of them took six times the log."""
     data = json_log(*((10 * k, {"d": [k + 0.5 * n for n in range(10_000)]}) for k in range(1, 101)))

@@ -1,5 +1,6 @@
 """Files that appear whole: also where several write one at once, where it is taken away, and beside left-over ones."""
 
+import os
 import subprocess
 import sys
 import threading
@@ -112,3 +113,12 @@ def test_processes_that_write_and_append_at_once_leave_whole_files(tmp_path):
     assert sorted(lines) == [letter * 3000 for letter in "abc" for _ in range(60)]
     assert names(tmp_path) == ["lines", "whole"]
     append_lines(tmp_path / "lines", [])
+
+
+def test_what_need_not_last_waits_for_no_disk(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(os, "fsync", synced.append)
+    assert write_file(tmp_path / "a", "x", lasting=False).read_text() == "x"
+    assert synced == []
+    write_file(tmp_path / "a", "y")
+    assert len(synced) == 2  # the file and its folder

@@ -25,7 +25,7 @@ LAYOUT = Layout(
     shapes=("arm/beam", "patient/body", "stand/column"),
     pairs=("arm/beam|patient/body", "patient/body|stand/column"),
     objects=("patient/body", "stand/column"),
-    sensors={"distance": ("left", "right ä"), "capacitive": ("guard",)},
+    sensors={**dict.fromkeys(KINDS, ()), "distance": ("left", "right ä"), "capacitive": ("guard",)},
 )
 FILES = {"run.yaml": b"version: 1\nname: made_up\n", "parts/body.stl": bytes(range(256)) * 20}
 BOX = np.array(

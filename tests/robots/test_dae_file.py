@@ -149,6 +149,10 @@ def test_polygons_that_are_not_all_there_and_holes_in_them_are_refused(tmp_path)
         read(tmp_path, faces=polygons.format(f"{whole}<ph>{whole}<h>0 1 2</h></ph>"))
     with pytest.raises(RobotError, match="<polylist> has count='4', of which 2 are there"):
         read(tmp_path, faces=POLYGONS.replace("3 3 3 3", "3 3"))
+    for corners in ("3 3 3 999999999", "3 3 3 4", "3 3 3 2"):  # the first would take 20 GB
+        total = sum(map(int, corners.split()))
+        with pytest.raises(RobotError, match=f"of a <polylist> have {total} corners, of which 12 are there"):
+            read(tmp_path, faces=POLYGONS.replace("3 3 3 3", corners))
 
 
 def test_corners_that_are_no_numbers_and_that_no_triangle_has_do_no_harm(tmp_path):

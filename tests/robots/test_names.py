@@ -39,6 +39,13 @@ def test_a_name_that_is_taken_gets_the_next_number():
     assert names.take("c") == "left_c_2" and names["c"] == "left_c"  # the first that is called so
 
 
+def test_a_hundred_thousand_of_one_name_are_numbered_without_looking_through_all_of_them():
+    names = RobotNames()
+    called = [names.take("box") for _ in range(100_000)]
+    assert called[:3] == ["box", "box_2", "box_3"] and called[-1] == "box_100000"
+    assert names.take("box_2") == "box_2_2" and names.take("box") == "box_100001"
+
+
 def test_long_names_that_begin_alike_stay_different_and_short_enough():
     names = RobotNames()
     called = [names.take("x" * 200 + str(k)) for k in range(1500)]

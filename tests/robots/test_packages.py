@@ -97,6 +97,20 @@ def test_a_path_from_the_folder_of_many_robots_on_is_found_and_told(tmp_path):
     here.mkdir()
     told = found(here, "robot/meshes/a.stl")
     assert (told.path, told.assumed) == (mesh, f"robot/ is taken to be {tmp_path / 'all' / 'robot'}")
+
+
+def test_a_path_from_a_folder_above_the_description_on_is_found_and_told(tmp_path):
+    mesh = put(tmp_path / "robot" / "meshes" / "a.stl")
+    here = tmp_path / "robot" / "urdf"
+    here.mkdir()
+    told = found(here, "meshes/a.stl")
+    assert (told.path, told.assumed) == (mesh, f"meshes/ is taken to be {tmp_path / 'robot' / 'meshes'}")
+    near = put(here / "meshes" / "a.stl")  # what is beside the description comes first
+    assert (found(here, "meshes/a.stl").path, found(here, "meshes/a.stl").assumed) == (near, "")
+    put(tmp_path / "b.stl")
+    for other in ("../b.stl", "b.stl", "x/../../b.stl"):
+        with pytest.raises(RobotError, match="is not to be found; looked for"):
+            found(here, other)
     nearer = put(here / "robot" / "meshes" / "a.stl")
     assert found(here, "robot/meshes/a.stl").path == nearer and not found(here, "robot/meshes/a.stl").assumed
     for written in ("robot/meshes/b.stl", "other/meshes/a.stl"):

@@ -195,6 +195,10 @@ def test_limits_of_moveit_replace_those_of_the_description(tmp_path):
     (tmp_path / "limits.yaml").write_text("joint_limits: {j: {has_velocity_limits: true}}\n")
     with pytest.raises(RobotError, match=r"limits\.yaml:1:.*max_velocity is missing"):
         imported(tmp_path, *parts, limits=tmp_path / "limits.yaml")
+    most = f"joint_limits: {{j: {{has_velocity_limits: true, max_velocity: 1{'0' * 399}}}}}\n"  # no double holds it
+    (tmp_path / "limits.yaml").write_text(most)
+    with pytest.raises(RobotError, match=r"limits\.yaml:1:.*max_velocity must be a number between"):
+        imported(tmp_path, *parts, limits=tmp_path / "limits.yaml")
     for wrong in (("2",), ("2 rad",), ("0 m/s^2",), ("1 m/s^2", "2 m/s^2")):
         with pytest.raises(RobotError, match="--acceleration"):
             imported(tmp_path, *parts, acceleration=wrong)
@@ -206,6 +210,14 @@ def test_links_that_are_only_shown_collide_when_asked_to(tmp_path):
     assert done.lossy and not loaded(tmp_path).links["a"].shapes
     done = imported(tmp_path, shown, collision="visual")
     assert not done.lossy and list(loaded(tmp_path).links["a"].shapes) == ["box"]
+
+
+def test_a_report_of_very_many_changes_is_short_and_soon_made(tmp_path):
+    """Were each unknown name looked for among those before it, this would take minutes."""
+    pairs = (f'<disable_collisions link1="x{k}" link2="y{k}"/>' for k in range(40_000))
+    done = imported(tmp_path, made.link("a", BOX), srdf="".join(pairs))
+    assert len(done.changes) == 1001 and str(done.changes[-1]) == "and more: 79000 others are not told"
+    assert not done.lossy
 
 
 def test_limits_that_leave_a_leader_no_position_are_dropped_with_a_loss(tmp_path):
@@ -281,6 +293,18 @@ def test_random_poses_show_which_pairs_never_and_always_touch(tmp_path):
     assert frozenset(("a", "near")) not in found  # sometimes: it stays tested
     assert [(a, b) for a, b, _ in done.part.disabled] == [(a, b) for a, b, _ in done.checked]
     assert loaded(tmp_path).collision.disable[0].reason == done.checked[0][2]
+
+
+def test_pairs_are_looked_at_in_random_poses_when_that_is_asked_for(tmp_path):
+    links = [made.link(name, BOX) for name in ("a", "b", "c")]
+    far = '<origin xyz="9 0 0"/><axis xyz="0 0 1"/>'
+    joints = [made.joint(f"to_{b}", a, b, "continuous", far) for a, b in (("a", "b"), ("b", "c"))]
+    (tmp_path / "r.urdf").write_text(made.robot(*links, *joints))
+    words = ["import", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "p.yaml"), "--overwrite"]
+    assert command(words) is ExitCode.FINE
+    assert "random poses" not in (tmp_path / "p.yaml").read_text()
+    assert command([*words, "--check-collisions", "7"]) is ExitCode.FINE
+    assert "never in contact in 7 random poses" in (tmp_path / "p.yaml").read_text()
 
 
 def test_the_command_says_what_was_lost_and_leaves_with_3(tmp_path, capsys):

@@ -13,6 +13,7 @@ from replay.errors import ScenarioError
 from replay.scenario.load import load, load_model, load_sources
 from replay.scenario.methods import METHOD_REVISIONS, Model
 from replay.scenario.yaml_text import parse
+from replay.sensing.kinds import KINDS
 
 DATA = Path(__file__).parent / "data"
 FULL = DATA / "full.yaml"
@@ -178,12 +179,12 @@ def test_models_come_by_name_or_from_a_file(tmp_path):
 
 def test_every_choice_of_method_has_a_revision():
     methods = Model.model_fields
-    assert set(methods) == {"collision", "distance", "capacitive"}
+    assert set(methods) == {"collision", *KINDS}
     expected = set()
     for option in ("bounds", "narrowphase", "pieces", "between"):
         field = methods["collision"].annotation.model_fields[option]
         expected |= {f"collision.{option}.{choice}" for choice in field.annotation.__args__}
-    for group in ("distance", "capacitive"):
+    for group in KINDS:
         field = methods[group].annotation.model_fields["method"]
         expected |= {f"{group}.{choice}" for choice in field.annotation.__args__}
     assert set(METHOD_REVISIONS) == expected

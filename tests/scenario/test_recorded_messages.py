@@ -12,7 +12,7 @@ from replay.scenario.load import load_sources
 from replay.scenario.recorded_series import Unusable, check_turns, unwrapped
 from tests.logs import made_logs
 from tests.logs.made_logs import Said
-from tests.scenario.swinging_logs import assert_same_track, load, swinging, told
+from tests.scenario.swinging_logs import STEP, assert_same_track, load, swinging, told
 
 OTHERS = {  # what tells the second publisher, and the way out
     "channel": ({"channel": 1}, "channels 1, 2; choose one by motion.recorded.channel", "channel: 1"),
@@ -33,6 +33,20 @@ def test_two_publishers_are_recognised_and_one_can_be_chosen(tmp_path, other, sh
     assert message in str(caught.value)
     if choice:
         assert_same_track(load(tmp_path, log, choice), load(tmp_path, made_logs.mcap(mine)))
+
+
+def test_publishers_in_turn_whose_messages_overtake_each_other_are_told_as_such(tmp_path):
+    """The stamps of each increase, and the log has all in the order in which they arrived."""
+    mine = [replace(s, time=s.stamp + 8_000_000 * (k % 2)) for k, s in enumerate(swinging())]
+    late = [replace(s, stamp=s.stamp + STEP // 4, time=s.stamp + STEP // 4, joints={"swing": 2.0}) for s in mine]
+    with pytest.raises(ScenarioError, match="is moved by several publishers in turn"):
+        load(tmp_path, made_logs.mcap(mine + late))
+
+
+def test_a_clock_that_is_set_back_is_told_as_such(tmp_path):
+    again = [replace(s, time=s.time + 10**10, joints={"swing": s.joints["swing"] + 0.4}) for s in swinging()]
+    with pytest.raises(ScenarioError, match=r"times in the log that do not increase: after 1.18 s comes 0 s"):
+        load(tmp_path, made_logs.mcap(swinging() + again))
 
 
 def test_a_channel_or_frame_that_is_not_there_is_told(tmp_path):

@@ -1,6 +1,11 @@
 """The generated JSON Schemas: up to date, and of one mind with the models."""
 
 import json
+import os
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
@@ -30,6 +35,20 @@ def validator(name):
 def test_the_files_are_up_to_date(name):
     written = (ROOT / "schemas" / name).read_text(encoding="utf-8")
     assert written == schema_text(FILES[name]), "run `make schemas`"
+
+
+def test_make_schemas_writes_what_stands_here(tmp_path):
+    shutil.copytree(ROOT / "replay", tmp_path / "replay", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "schemas").mkdir()
+    kept = (ROOT / "schemas" / "README.md").read_text(encoding="utf-8")
+    (tmp_path / "schemas" / "README.md").write_text(kept.partition("## Reference")[0], encoding="utf-8")
+    target = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nschemas:")[2].partition("\n\n")[0]
+    for module in re.findall(r"-m (replay\S+)", target):
+        subprocess.run([sys.executable, "-m", module], cwd=tmp_path, env={**os.environ, "PYTHONPATH": ""}, check=True)
+    written = sorted(path.name for path in (tmp_path / "schemas").iterdir())
+    assert written == sorted(["README.md", *(path.name for path in (ROOT / "schemas").glob("*.schema.json"))])
+    for name in written:
+        assert (tmp_path / "schemas" / name).read_bytes() == (ROOT / "schemas" / name).read_bytes(), name
 
 
 def test_a_models_file_is_what_the_command_line_reads():

@@ -81,7 +81,7 @@ def test_every_key_and_value_knows_its_place():
     [
         (b"a: \xff", "f.yaml:1:4: byte 0xff is not UTF-8; save the file as UTF-8"),
         (b"a: 1\nb: \xe4\n", "f.yaml:2:4: byte 0xe4 is not UTF-8; save the file as UTF-8"),
-        ("a: 1".encode("utf-16"), "f.yaml:1:1: byte 0xff is not UTF-8; save the file as UTF-8"),
+        ("a: 1".encode("utf-16"), "f.yaml:1:1: UTF-16 text; save the file as UTF-8"),
         ("a:\n\t- x", "f.yaml:2:1: not YAML: a tab cannot indent YAML; use spaces"),
         ("a: [1,\nb: 2", "f.yaml:2:5: not YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence that starts at 1:4)"),

@@ -16,15 +16,16 @@ import trimesh
 from ruamel.yaml import YAML
 
 import replay
-from replay.batch.case import CaseStatus
-from replay.batch.run import run_all
 from replay.batch.select import find_scenarios
+from replay.cli.exit_codes import ExitCode
+from replay.cli.main import run
 from replay.collision.columns import Level
 from replay.sensing.distance.columns import Detection
 
 pytestmark = pytest.mark.compiled  # phantoms of thousands of triangles
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
+BASELINES = Path(__file__).parents[1] / "baselines"
 NAMES = (
     "carm_bodyguard",
     "carm_clear",
@@ -45,11 +46,17 @@ PANEL_ON_PATIENT = "detector/panel|patient/body"
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    """Return the result and the recording of each scenario, by name."""
+def night(tmp_path_factory):
+    """Return the exit code of a regression of all shipped scenarios, and its folder."""
     folder = tmp_path_factory.mktemp("shipped")
-    results = run_all([replay.load(SCENARIOS / f"{name}.yaml") for name in NAMES], folder, rrd=False).results
-    return {result.name: (result, result.recordings and replay.read(result.recordings.mcap)) for result in results}
+    return run(["regress", str(SCENARIOS), "--baseline", str(BASELINES), "-o", str(folder)]), folder
+
+
+@pytest.fixture(scope="module")
+def runs(night):
+    """Return the result, as it is written, and the recording of each scenario, by name."""
+    results = {name: json.loads((night[1] / name / "result.json").read_text()) for name in NAMES}
+    return {name: (result, replay.read(night[1] / name / f"{name}.mcap")) for name, result in results.items()}
 
 
 def recording_of(runs, name):
@@ -126,16 +133,18 @@ def test_the_folder_holds_these_scenarios():
     assert {scenario.name for scenario in found if "nightly" in scenario.tags} == {*NAMES, *REACTING, *MEASURED}
 
 
+def test_all_are_as_accepted(night):
+    code, folder = night
+    assert code is ExitCode.FINE, json.loads((folder / "run.json").read_text())["verdicts"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_expectations_hold(runs, name):
     result, recording = runs[name]
-    assert result.error == ""
-    assert result.status is CaseStatus.PASSED, [
-        outcome.expectation for outcome in result.outcomes if not outcome.passed
-    ]
-    assert recording is not None
+    assert result["error"] == ""
+    assert result["status"] == "passed", [held for held in result["expectations"] if not held["passed"]]
     assert not recording.collision.undecided.any()
-    assert len(recording.time) == result.frames
+    assert len(recording.time) == result["frames"]
 
 
 def test_clear_is_clear(runs):

@@ -1,1 +1,1 @@
-"""The thesis's experiments I to IV: splitting, fitting a curve, predicting other plates and a pivoting one."""
+"""The thesis's experiments I to IV, splitting, fits and predictions; V and VI, neighbours and a person's earth."""

@@ -11,11 +11,15 @@ from replay.logs.curve_csv import Column, Curve, read_curve
 from replay.scenario.calibration import SensorPath
 from replay.scenario.load import load
 from replay.sensing.calibration import Quantity
-from replay.sensing.capacitive.part import SUPPLY
+from replay.sensing.capacitive.part import SUPPLY, CapacitiveMethod
 
 PICOFARAD = float(CAPACITANCE.units["pF"])
 COUPLING = 10.0
 """C_couple [pF] of the plates in scenarios/experiments, which a delta output needs."""
+
+
+THESIS, FIELD = "thesis", "field"
+"""What predicts: the thesis's model, whose permittivity is a number of the fit, or electrostatics."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +58,22 @@ class Reading:
     stray: float
     offset: bool = True
 
+    def fits_offset(self, model: str) -> bool:
+        """Return whether a model has an offset to fit: the thesis's needs one for what the sensor is by itself."""
+        return self.offset if model == THESIS else self.stray > 0.0
 
-SELF = Reading("self capacitance, nothing stray", "self_capacitance_pF", "capacitance", 0.0)
-SELF_STRAY = Reading("self capacitance, 10 pF stray", "self_capacitance_pF", "capacitance", 10.0)
-DELTA = Reading("delta output, 10 pF coupling, nothing stray", "self_capacitance_pF", "delta_output", 0.0)
-DELTA_STRAY = Reading("delta output, 10 pF coupling, 10 pF stray", "self_capacitance_pF", "delta_output", 10.0)
+    def told_by(self, model: str) -> bool:
+        """Return whether a model has this quantity: `field` has no charge of the target."""
+        return model == THESIS or self.column == SELF_COLUMN
+
+
+SELF_COLUMN = "self_capacitance_pF"
+SELF = Reading("self capacitance, nothing stray", SELF_COLUMN, "capacitance", 0.0)
+SELF_STRAY = Reading("self capacitance, 10 pF stray", SELF_COLUMN, "capacitance", 10.0)
+DELTA = Reading("delta output, 10 pF coupling, nothing stray", SELF_COLUMN, "delta_output", 0.0)
+DELTA_STRAY = Reading("delta output, 10 pF coupling, 10 pF stray", SELF_COLUMN, "delta_output", 10.0)
 MUTUAL = Reading("mutual capacitance, fitted without offset", "mutual_capacitance_pF", "capacitance", 0.0, offset=False)
-NO_OFFSET = Reading("self capacitance, fitted without offset", "self_capacitance_pF", "capacitance", 0.0, offset=False)
+NO_OFFSET = Reading("self capacitance, fitted without offset", SELF_COLUMN, "capacitance", 0.0, offset=False)
 READINGS = (SELF, SELF_STRAY, DELTA, DELTA_STRAY, MUTUAL, NO_OFFSET)
 
 
@@ -82,14 +95,27 @@ class Bench:
         file = self.folder / "data" / "pivot_curves.csv"
         return _read_as(reading, read_curve(file, x="angle_deg", y=reading.column, where=where))
 
-    def path(self, plate: MeasuredPlate, kind: str, side: int) -> SensorPath:
+    def path(self, plate: MeasuredPlate, kind: str, side: int, model: str = THESIS) -> SensorPath:
         """Return the model of a plate in the scenario `parallel` or `pivot` of that target [cm]."""
-        return _path(self.folder / f"{kind}_{side}cm.yaml", plate.sensor)
+        return _path(self.folder / f"{kind}_{side}cm.yaml", plate.sensor, model)
 
 
 @cache
-def _path(file: Path, sensor: str) -> SensorPath:
-    return SensorPath(load(file), sensor=sensor)
+def _path(file: Path, sensor: str, model: str) -> SensorPath:
+    scenario = load(file)
+    if model == THESIS:
+        return SensorPath(scenario, sensor=sensor)
+    # the scenario's sensors lie on each other; to electrostatics they would be conductors that touch
+    own = {sensor: scenario.sensors.capacitive[sensor]}
+    method = CapacitiveMethod(method="field")
+    return SensorPath(
+        scenario.model_copy(
+            update={
+                "sensors": scenario.sensors.model_copy(update={"capacitive": own}),
+                "model": scenario.model.model_copy(update={"capacitive": method}),
+            }
+        )
+    )
 
 
 def _read_as(reading: Reading, curve: Curve) -> Curve:

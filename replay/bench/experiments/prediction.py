@@ -11,12 +11,14 @@ import numpy as np
 
 from replay.bench.experiments.measured import (
     DELTA_STRAY,
+    FIELD,
     PICOFARAD,
     PLATES,
     READINGS,
     SELF,
     SIDES,
     SMALL,
+    THESIS,
     Bench,
     MeasuredPlate,
     Reading,
@@ -35,12 +37,19 @@ PIVOTS = ((20, 20), (10, 20), (10, 10))
 """Experiment IV: edge length [cm] of the pivoting plate, and of the parallel one that was fitted."""
 
 
+_HONEST = (
+    "The measured sensor is electrostatics of ideal conductors too: of field this says how well it solves them,"
+    " not how well they describe a real sensor."
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Prediction:
     """A curve that was measured and what a fit on another one says of it.
 
     Attributes:
         plate, reading: of the sensor.
+        model: `THESIS` or `FIELD`.
         fitted_side, side: edge lengths [cm] of the target fitted and of the target predicted.
         curve: measured.
         predicted: (n,) in the curve's unit.
@@ -48,6 +57,7 @@ class Prediction:
 
     plate: MeasuredPlate
     reading: Reading
+    model: str
     fitted_side: int
     side: int
     curve: Curve
@@ -70,24 +80,41 @@ class Prediction:
         return int(np.argmax(np.abs(self.deviation)))
 
 
-def fit(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int = FITTED_SIDE) -> CurveFit:
+def fit(
+    bench: Bench, plate: MeasuredPlate, reading: Reading, side: int = FITTED_SIDE, *, model: str = THESIS
+) -> CurveFit:
     """Return the fit on a parallel target plate of an edge length [cm]."""
-    path, curve = bench.path(plate, "parallel", side), bench.parallel(plate, reading, side)
-    return fit_curve(path, curve, quantity=reading.quantity, offset=reading.offset)
+    path, curve = bench.path(plate, "parallel", side, model), bench.parallel(plate, reading, side)
+    return fit_curve(path, curve, quantity=reading.quantity, offset=reading.fits_offset(model))
 
 
-def predict_parallel(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int) -> Prediction:
+def predict_parallel(
+    bench: Bench, plate: MeasuredPlate, reading: Reading, side: int, *, model: str = THESIS
+) -> Prediction:
     """Return what the fit on 20 cm says of a parallel plate of another edge length [cm]."""
-    found = fit(bench, plate, reading)
-    path, curve = bench.path(plate, "parallel", side), bench.parallel(plate, reading, side)
-    return Prediction(plate, reading, FITTED_SIDE, side, curve, _predicted(found, path, curve))
+    found = fit(bench, plate, reading, model=model)
+    path, curve = bench.path(plate, "parallel", side, model), bench.parallel(plate, reading, side)
+    return Prediction(plate, reading, model, FITTED_SIDE, side, curve, _predicted(found, path, curve))
 
 
-def predict_pivot(bench: Bench, plate: MeasuredPlate, reading: Reading, side: int, fitted_side: int) -> Prediction:
+def predict_pivot(
+    bench: Bench, plate: MeasuredPlate, reading: Reading, side: int, fitted_side: int, *, model: str = THESIS
+) -> Prediction:
     """Return what the fit on a parallel plate says of a pivoting one; edge lengths [cm]."""
-    found = fit(bench, plate, reading, fitted_side)
-    path, curve = bench.path(plate, "pivot", side), bench.pivot(plate, reading, side)
-    return Prediction(plate, reading, fitted_side, side, curve, _predicted(found, path, curve))
+    found = fit(bench, plate, reading, fitted_side, model=model)
+    path, curve = bench.path(plate, "pivot", side, model), bench.pivot(plate, reading, side)
+    return Prediction(plate, reading, model, fitted_side, side, curve, _predicted(found, path, curve))
+
+
+def _asked(plates: Sequence[MeasuredPlate]) -> list[tuple[str, Reading, MeasuredPlate]]:
+    """Return what each model can be asked; how far a back plate is behind its sensor is not on record."""
+    return [
+        (model, reading, plate)
+        for reading in READINGS
+        for model in (THESIS, FIELD)
+        for plate in plates
+        if model == THESIS or (reading.told_by(model) and not plate.back)
+    ]
 
 
 def _predicted(found: CurveFit, path: SensorPath, curve: Curve) -> Floats:
@@ -108,30 +135,34 @@ def run_fit(folder: Path) -> tuple[list[Table], list[Panel]]:
     bench = Bench(folder)
     rows: list[dict[str, Cell]] = []
     panels = []
-    for reading in READINGS:
-        for plate in PLATES:
-            found = fit(bench, plate, reading)
-            constants = found.calibration
-            eps = next(entry for entry in constants.estimates if entry.name == "permittivity")
-            misfit = np.abs(constants.residuals / constants.measured)
-            rows.append(
-                {
-                    "fitted quantity": reading.name,
-                    "sensor [cm]": plate.name,
-                    "eps [pF/m]": constants.permittivity / PICOFARAD,
-                    "+- (95%)": eps.half_width / PICOFARAD,
-                    "C_0 [pF]": constants.stray_capacitance / PICOFARAD,
-                    "rms residual": constants.rms / found.unit,
-                    "unit": found.curve.y.unit,
-                    "worst [%]": 100.0 * float(misfit.max()),
-                }
-            )
-            if reading in (SELF, DELTA_STRAY) and plate is not PLATES[-1]:
-                x, y = found.curve.x_values, found.curve.y_values
-                lines = [Line("measured", x, y, points=True), Line("fitted", x, constants.fitted / found.unit, color=1)]
-                title = f"II. {plate.name} cm sensor, {FITTED_SIDE} cm plate\n{reading.name}"
-                panels.append(Panel(title, found.curve.x.header, found.curve.y.header, lines))
-    remarks = ["eps is a number of this fit, not of a material: the vacuum's would be 8.854 pF/m."]
+    for model, reading, plate in _asked(PLATES):
+        found = fit(bench, plate, reading, model=model)
+        constants = found.calibration
+        eps = next(entry for entry in constants.estimates if entry.name == "permittivity")
+        misfit = np.abs(constants.residuals / constants.measured)
+        rows.append(
+            {
+                "fitted quantity": reading.name,
+                "model": model,
+                "sensor [cm]": plate.name,
+                "eps [pF/m]": constants.permittivity / PICOFARAD,
+                "+- (95%)": eps.half_width / PICOFARAD,
+                "C_0 [pF]": constants.stray_capacitance / PICOFARAD,
+                "rms residual": constants.rms / found.unit,
+                "unit": found.curve.y.unit,
+                "worst [%]": 100.0 * float(misfit.max()),
+            }
+        )
+        if model == THESIS and reading in (SELF, DELTA_STRAY) and not plate.back:
+            x, y = found.curve.x_values, found.curve.y_values
+            lines = [Line("measured", x, y, points=True), Line("fitted", x, constants.fitted / found.unit, color=1)]
+            title = f"II. {plate.name} cm sensor, {FITTED_SIDE} cm plate\n{reading.name}"
+            panels.append(Panel(title, found.curve.x.header, found.curve.y.header, lines))
+    remarks = [
+        "eps is a number of this fit, not of a material: the vacuum's is 8.854 pF/m.",
+        "field knows what the sensor is by itself, so eps is the vacuum's times what is left to fit, and C_0 is stray.",
+        _HONEST,
+    ]
     title = f"II. Fit on a parallel plate of {FITTED_SIDE} cm (worst: largest residual over the measured value)"
     return [Table("experiment_2_fit", title, rows, remarks)], panels
 
@@ -140,13 +171,13 @@ def run_sizes(folder: Path) -> tuple[list[Table], list[Panel]]:
     """Return tables and drawings of experiment III: the other plate sizes predicted from the fit on 20 cm."""
     bench = Bench(folder)
     found = [
-        predict_parallel(bench, plate, reading, side)
-        for reading in READINGS
-        for plate in PLATES
+        predict_parallel(bench, plate, reading, side, model=model)
+        for model, reading, plate in _asked(PLATES)
         for side in SIDES
         if side != FITTED_SIDE
     ]
-    remarks = [_signs(reading, found) for reading in READINGS]
+    told = dict.fromkeys((entry.model, entry.reading) for entry in found)
+    remarks = [*(_signs(model, reading, found) for model, reading in told), _HONEST]
     title = f"III. Other plate sizes, predicted from the fit on {FITTED_SIDE} cm: predicted over measured - 1"
     tables = [
         Table("experiment_3_sizes", title, [_summary(entry) for entry in found], remarks),
@@ -158,12 +189,17 @@ def run_sizes(folder: Path) -> tuple[list[Table], list[Panel]]:
 def run_pivot(folder: Path) -> tuple[list[Table], list[Panel]]:
     """Return tables and drawings of experiment IV: the pivoting plate predicted from the fit on a parallel one."""
     bench = Bench(folder)
-    found = [predict_pivot(bench, SMALL, reading, *sides) for reading in READINGS for sides in PIVOTS]
+    found = [
+        predict_pivot(bench, plate, reading, *sides, model=model)
+        for model, reading, plate in _asked([SMALL])
+        for sides in PIVOTS
+    ]
     tables = [
         Table(
             "experiment_4_pivot",
             "IV. Pivoting plate, predicted from the fit on a parallel one: predicted over measured - 1",
             [_summary(entry) for entry in found],
+            [_HONEST],
         ),
         Table("experiment_4_points", "IV. Point by point", [row for entry in found for row in _points(entry)]),
     ]
@@ -174,6 +210,7 @@ def _summary(entry: Prediction) -> dict[str, Cell]:
     percent, worst = 100.0 * entry.deviation, entry.worst
     return {
         "fitted quantity": entry.reading.name,
+        "model": entry.model,
         "sensor [cm]": entry.plate.name,
         "fitted [cm]": entry.fitted_side,
         "plate [cm]": entry.side,
@@ -191,6 +228,7 @@ def _points(entry: Prediction) -> list[dict[str, Cell]]:
     return [
         {
             "fitted quantity": entry.reading.name,
+            "model": entry.model,
             "sensor [cm]": entry.plate.name,
             "fitted [cm]": entry.fitted_side,
             "plate [cm]": entry.side,
@@ -204,24 +242,31 @@ def _points(entry: Prediction) -> list[dict[str, Cell]]:
     ]
 
 
-def _signs(reading: Reading, predictions: Iterable[Prediction]) -> str:
+def _signs(model: str, reading: Reading, predictions: Iterable[Prediction]) -> str:
     """Return one line: the worst deviations for each size, of the sensors without a back plate and of the one with."""
     parts = []
-    chosen = [entry for entry in predictions if entry.reading is reading]
+    chosen = [entry for entry in predictions if entry.reading is reading and entry.model == model]
     for side in SIDES:
         worst = [(entry.plate.back, float(entry.deviation[entry.worst])) for entry in chosen if entry.side == side]
         if worst:
             open_ones = _span([value for back, value in worst if not back])
             backed = _span([value for back, value in worst if back])
-            parts.append(f"{side} cm plate {open_ones} ({backed} with a grounded back plate)")
+            beside = f" ({backed} with a grounded back plate)" if backed else ""
+            parts.append(f"{side} cm plate {open_ones}{beside}")
     of_range = [100.0 * entry.worst_of_range for entry in chosen]
-    range_part = f"{min(of_range):.0f} .. {max(of_range):.0f} % of the curve's own range"
-    return f"{reading.name}, worst point: {'; '.join(parts)}; {range_part}."
+    range_part = f"{min(of_range):.2g} .. {max(of_range):.2g} % of the curve's own range"
+    by = "" if model == THESIS else f"{model}, "
+    return f"{by}{reading.name}, worst point: {'; '.join(parts)}; {range_part}."
 
 
 def _span(values: Sequence[float]) -> str:
+    if not values:
+        return ""
     low, high = 100.0 * min(values), 100.0 * max(values)
-    return f"{low:+.0f} %" if round(low) == round(high) else f"{low:+.0f} .. {high:+.0f} %"
+    digits = 0 if max(-low, high) >= 1.0 else 1
+    if round(low, digits) == round(high, digits):
+        return f"{low:+.{digits}f} %"
+    return f"{low:+.{digits}f} .. {high:+.{digits}f} %"
 
 
 def _panels(title: str, predictions: Iterable[Prediction]) -> list[Panel]:
@@ -236,9 +281,10 @@ def _panels(title: str, predictions: Iterable[Prediction]) -> list[Panel]:
         for color, entry in enumerate(entries):
             x = entry.curve.x_values
             name = f"{entry.side} cm plate"
-            lines.append(Line(f"{name}, measured", x, entry.curve.y_values, points=True, color=color))
+            if entry.model == THESIS:
+                lines.append(Line(f"{name}, measured", x, entry.curve.y_values, points=True, color=color))
             label = f"{name}, predicted from {entry.fitted_side} cm"
-            lines.append(Line(label, x, entry.predicted, color=color))
+            lines.append(Line(f"{label} by {entry.model}", x, entry.predicted, color=color))
         first = entries[0].curve
         panels.append(Panel(f"{title}. {plate.name} cm sensor\n{reading.name}", first.x.header, first.y.header, lines))
     return panels

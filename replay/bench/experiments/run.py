@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from replay.bench.experiments import prediction, splitting
+from replay.bench.experiments import conductors, prediction, splitting
 from replay.bench.experiments.tables import Table
 from replay.errors import InvalidValue, RecordingExistsError
 from replay.logs.part_file import write_file
@@ -16,16 +16,18 @@ EXPERIMENTS: dict[str, Callable[[Path], tuple[list[Table], list[Panel]]]] = {
     "II": prediction.run_fit,
     "III": prediction.run_sizes,
     "IV": prediction.run_pivot,
+    "V": conductors.run_neighbours,
+    "VI": conductors.run_person,
 }
-"""By the thesis's number."""
+"""By number; the first four are the thesis's."""
 
 
 def run(name: str, folder: Path) -> tuple[list[Table], list[Panel]]:
     """Return the tables and drawings of one experiment.
 
     Args:
-        name: "I", "II", "III" or "IV".
-        folder: with the experiments' scenarios, `scenarios/experiments` of this project.
+        name: a key of `EXPERIMENTS`.
+        folder: with the scenarios of I to IV, `scenarios/experiments` of this project.
 
     Raises:
         InvalidValue: the folder is not there.

@@ -97,14 +97,11 @@ def load_map(path: Path) -> tuple[MeasuredMapPart, Callable[[KeyPath, str], Prob
     return written, lambda at, rule: problem_at(root, at[len(measured_log.PATH) :], rule)
 
 
-def compare_recording(
-    path: str | Path, *, source: MeasuredSource | None = None, rules: Rules | None = None
-) -> MeasuredComparison:
-    """Return what a recording says beside a log of the machine.
+def compare_recording(path: str | Path, *, rules: Rules | None = None) -> MeasuredComparison:
+    """Return what a recording says beside the log of the machine that is attached to it: it needs nothing else.
 
     Args:
         path: of a recording.
-        source: of the log; when left out, what is attached to the recording: the comparison needs nothing else.
         rules: tolerances; without them everything must be equal.
 
     Raises:
@@ -117,7 +114,7 @@ def compare_recording(
         provenance = read_provenance(file)
         files = read_files(file, provenance)
     scenario = load_sources(provenance.root, files, case=provenance.scenario)
-    source = source or MeasuredSource.of_scenario(scenario)
+    source = MeasuredSource.of_scenario(scenario)
     if source is None:
         rule = (
             "its scenario names no log of the machine: give it a `measured`, or name the log with --measured and --map"

@@ -29,7 +29,7 @@ import numba
 from numba import config, types
 from numba.core import event
 
-from replay.numerics.jit import front_end, linking, progress, store
+from replay.numerics.jit import front_end, linking, progress, records, store
 from replay.numerics.jit.linking import KernelLibrary
 from replay.numerics.jit.reach import key_of, name_of, reached
 
@@ -57,8 +57,12 @@ except ImportError:  # another numba: see the module's text
 
 AVAILABLE = (
     numba.__version__.startswith(TRIED)
-    and bool(_NEEDED and front_end.NEEDED and linking.NEEDED)
-    and all(hasattr(place, name) for place, names in (*_NEEDED, *front_end.NEEDED, *linking.NEEDED) for name in names)
+    and bool(_NEEDED and front_end.NEEDED and linking.NEEDED and records.NEEDED)
+    and all(
+        hasattr(place, name)
+        for place, names in (*_NEEDED, *front_end.NEEDED, *linking.NEEDED, *records.NEEDED)
+        for name in names
+    )
 )
 """Whether this numba is one whose inner side is known."""
 

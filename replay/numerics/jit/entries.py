@@ -1,7 +1,8 @@
 """Kernels that scenarios call: with the types they take declared, they can be compiled before anything calls them.
 
-`compile_entries` makes a list of them ready, the longest first, and leaves to another process what that one is
-compiling: so any number of processes that call it share the work.
+`compile_entries` makes a list of them ready, and leaves to another process what that one is compiling: so any number of
+processes that call it share the work. Each takes what has least in common with what others have taken: kernels that
+call the same ones go to one process, which looks into these once.
 """
 
 from __future__ import annotations
@@ -13,20 +14,28 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
-from numba import types
+from numba import typeof, types
 
-from replay.numerics.jit import compiler, progress, store
+from replay.numerics.jit import compiler, progress, records, store
 from replay.numerics.jit.reach import key_of, name_of, reached
 from replay.numerics.remarks import remark
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def record(named_tuple: type, *fields: Any) -> Any:
-    """Return the numba type of a named tuple, given those of its fields in order."""
+def record(named_tuple: Any, *fields: Any) -> Any:
+    """Return the numba type of a named tuple that Python gives to kernels, given those of its fields in order."""
+    if compiler.AVAILABLE:
+        records.are_records(named_tuple)
+        return records.Record(named_tuple, fields)
     if len({*fields}) == 1:
         return types.NamedUniTuple(fields[0], len(fields), named_tuple)
     return types.NamedTuple(fields, named_tuple)
+
+
+def record_like(made: Any) -> Any:
+    """Return the numba type of named tuples like one that was made, with those it holds."""
+    return record(type(made), *(record_like(field) if isinstance(field, tuple) else typeof(field) for field in made))
 
 
 def entry(*arguments: Any) -> Callable[[Function], Function]:
@@ -74,14 +83,19 @@ class _Entry:
         return key_of(self.kernel, self.kernel.declared)
 
     @cached_property
-    def size(self) -> int:
-        """How many kernels it reaches, itself included."""
-        return len(reached(self.kernel))
+    def parts(self) -> frozenset[str]:
+        """The kernels it reaches, itself included."""
+        return frozenset(reached(self.kernel))
 
     @property
     def is_ready(self) -> bool:
         """Whether it is compiled already, by this process or another."""
         return store.has(self.name, self.key)
+
+    @property
+    def is_claimed(self) -> bool:
+        """Whether a process is compiling it."""
+        return store.is_claimed(self.name, self.key)
 
 
 def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: None) -> None:
@@ -98,7 +112,6 @@ def compile_entries(kernels: Iterable[Any], share: Callable[[], None] = lambda: 
     entries = [_Entry(kernel) for kernel in dict.fromkeys(kernels) if hasattr(kernel, "compile")]
     missing = [entry for entry in entries if compiler.AVAILABLE and not entry.is_ready]
     if missing:
-        missing.sort(key=lambda entry: -entry.size)
         if len(missing) > 1 and store.directory() is not None:
             share()
         _compile(missing)
@@ -110,15 +123,20 @@ def _compile(missing: list[_Entry]) -> None:
     mine: list[_Entry] = []
 
     def elsewhere() -> int:
-        return sum(entry.size for entry in missing if entry not in mine and entry.is_ready)
+        return sum(len(entry.parts) for entry in missing if entry not in mine and entry.is_ready)
 
     counted = progress.counted()
-    counted.begin(sum(entry.size for entry in missing), elsewhere)
+    counted.begin(sum(len(entry.parts) for entry in missing), elsewhere)
     try:
-        for last in (False, True):  # what others are compiling comes last, and is done by then, or they are dead
+        while left := [entry for entry in missing if entry not in mine and not entry.is_ready]:
+            taken = [entry for entry in left if entry.is_claimed]
+            others: frozenset[str] = frozenset()
             for entry in missing:
-                if not entry.is_ready and (last or not store.is_claimed(entry.name, entry.key)):
-                    mine.append(entry)
-                    entry.kernel.compile(entry.kernel.declared)
+                if entry in taken or (entry not in left and entry not in mine):
+                    others |= entry.parts
+            # what others are compiling comes last, and is done by then, or they are dead
+            free = [entry for entry in left if entry not in taken] or left
+            mine.append(max(free, key=lambda entry: len(entry.parts - others)))
+            mine[-1].kernel.compile(mine[-1].kernel.declared)
     finally:
         counted.end()

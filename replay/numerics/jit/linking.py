@@ -6,6 +6,8 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
+from replay.numerics.jit.records import is_address
+
 NEEDED: tuple[tuple[Any, tuple[str, ...]], ...] = ()
 """What of numba is needed here: names by where they are; empty where it cannot be imported."""
 
@@ -14,7 +16,10 @@ try:
     from numba.core.environment import lookup_environment
 
     NEEDED = (
-        (JITCodeLibrary, ("_unserialize", "_finalize_final_module", "_finalize_dynamic_globals", "add_llvm_module")),
+        (
+            JITCodeLibrary,
+            ("_unserialize", "_finalize_final_module", "_finalize_dynamic_globals", "add_llvm_module", "add_ir_module"),
+        ),
         (JITCPUCodegen, ("set_env", "_module_pass_manager", "_library_class")),
     )
 except ImportError:  # another numba
@@ -28,6 +33,17 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Name of the variable that holds what the function that Python calls needs of Python."""
     _emitted = False
     _shared_module: Any
+
+    def add_ir_module(self, module: Any) -> None:
+        """Take in code as numba writes it; nobody writes to a record but where it is laid down (see `records`)."""
+        for function in module.functions:
+            for argument in function.args:
+                if is_address(argument.type):
+                    for promise in ("noalias", "captures(none)"):
+                        argument.add_attribute(promise)
+                    argument.attributes.dereferenceable = argument.type.pointee.get_abi_size(self._codegen.target_data)
+                    argument.attributes.align = 8
+        super().add_ir_module(module)
 
     def add_llvm_module(self, module: Any) -> None:
         """Take in code as it is."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -37,7 +37,7 @@ class Capacitive(SensorKind):
     name = "capacitive"
     part = CapacitiveSensorPart
     method = CapacitiveMethod
-    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "field": 1, "bem": 1}
+    revisions: ClassVar = {"tree": 6, "exact": 4, "midpoint": 3, "field": 2, "bem": 2}
     slow = ELECTROSTATIC
     models: ClassVar = {"thesis2015": CapacitiveMethod(method="midpoint", splits=4)}
     expectation = CapacitiveExpectation
@@ -109,6 +109,15 @@ class Capacitive(SensorKind):
         from replay.sensing.electrostatics import suite
 
         return suite.kernels(method=method.method, savings=savings)
+
+    def faults(
+        self, parts: Mapping[str, CapacitiveSensorPart], felt: Callable[[], Mapping[str, Sequence[str]]], method: Any
+    ) -> Iterator[tuple[tuple[str, ...], str]]:
+        """See `SensorKind`: sensors that cannot be one unit."""
+        if method.method in ELECTROSTATIC:
+            from replay.sensing.electrostatics.notes import faults
+
+            yield from faults(parts, felt(), method.method)
 
     def notes(
         self,

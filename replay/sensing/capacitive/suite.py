@@ -21,7 +21,7 @@ from replay.sensing.capacitive.contact import plates_inside
 from replay.sensing.capacitive.counters import CapacitiveCounters
 from replay.sensing.capacitive.integral import check_splits
 from replay.sensing.capacitive.sensor import CapacitiveSensor, output_voltage
-from replay.sensing.capacitive.tree import clusters, moments
+from replay.sensing.capacitive.tree import clusters, moments, tree_sum
 from replay.sensing.capacitive.tree.clusters import Clusters, make_clusters
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
 from replay.sensing.capacitive.triangle_sum import EXACT, sum_triangles, triangle_areas
@@ -36,7 +36,7 @@ SMALLEST_RTOL = 1e-12
 
 def kernels(*, method: str, savings: bool = True, **_numbers: float) -> tuple[Any, ...]:
     """Return the kernels that a suite with these options calls; see `CapacitiveSuite`."""
-    own = (*entries_of(clusters, moments), sum_tree) if method == "tree" and savings else (sum_triangles,)
+    own = entries_of(clusters, moments, tree_sum) if method == "tree" and savings else (sum_triangles,)
     return (*entries_of(tree), triangle_areas, plates_inside, *own)
 
 

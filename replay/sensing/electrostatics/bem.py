@@ -5,7 +5,7 @@ its images, fine where it is near the bodies; phi comes from the unit's own mesh
 level. With the levels' values v0, v1, v2,
 
     value = v2 + (v2 - v1) / (rho - 1),    rho = (v1 - v0) / (v2 - v1) within 1.8 .. 4,
-    error = |value - v2| / 2 + 2e-4 value + |effect of the extrapolation of phi| / 2.
+    error = |value - v2| + 2e-4 value + |effect of the extrapolation of phi| / 2.
 """
 
 from __future__ import annotations
@@ -66,18 +66,19 @@ def read(unit: Unit, placement: PosedBodies) -> BemReading | None:
     scale = _scale(unit, placement)
     found = []
     for fineness in LEVELS:
-        level = _level(unit, placement, scale * fineness)
-        if level is None:
+        solved = level(unit, placement, scale * fineness)
+        if solved is None:
             return None
-        found.append(level)
+        found.append(solved)
     values, shares = [each[0].increase for each in found], [each[0].shares for each in found]
-    value, share = _extrapolated(values), _extrapolated(shares)
+    value, share = extrapolated(values), extrapolated(shares)
     share += (value - share.sum(axis=0)) * np.abs(share) / np.maximum(np.abs(share).sum(axis=0), 1e-300)
-    error = 0.5 * np.abs(value - values[2]) + _ROUNDING * np.abs(value) + 0.5 * np.abs(found[2][1])
+    error = np.abs(value - values[2]) + _ROUNDING * np.abs(value) + 0.5 * np.abs(found[2][1])
     return BemReading(value, error, share)
 
 
-def _extrapolated(v: Sequence[Floats]) -> Floats:
+def extrapolated(v: Sequence[Floats]) -> Floats:
+    """Return what the values of the three levels say of meshes without end."""
     last, before = v[2] - v[1], v[1] - v[0]
     ratio = np.divide(before, last, out=np.full_like(last, 4.0), where=last != 0.0)
     return np.asarray(v[2] + last / (np.clip(ratio, 1.8, 4.0) - 1.0))
@@ -98,7 +99,7 @@ def _count(image: Panels, parts: list[Panels]) -> int:
     return len(image.area) + sum(len(part.area) for part in parts)
 
 
-def _level(unit: Unit, placement: PosedBodies, fineness: float) -> tuple[Response, Floats] | None:
+def level(unit: Unit, placement: PosedBodies, fineness: float) -> tuple[Response, Floats] | None:
     """Return what bodies change at one fineness, and what of it the extrapolation of phi makes."""
     image, parts = meshes(unit, placement, fineness)
     bodies = joined(parts)

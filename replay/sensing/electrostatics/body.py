@@ -12,12 +12,16 @@ from replay.geometry.tree import Tree, triangle_tree
 from replay.numerics.arrays import Floats
 from replay.sensing.electrostatics.faces import Faces, faces_of
 from replay.sensing.electrostatics.grading import graded
-from replay.sensing.electrostatics.panels import Panels, joined
+from replay.sensing.electrostatics.panels import Panels, chosen, halved, joined
 from replay.sensing.electrostatics.refinement import bounded, point_sample
 
 _CELLS = 9.0
 _LARGEST, _SHARE = 0.13, 1.0 / 3.0
 """The largest diameter of a panel: [m], and as a share of the body's extent; at fineness 1."""
+
+_AS_THEY_ARE = 1.5
+"""Fineness at which the triangles of a surface are not halved; they are once wherever it falls by the root of 2: what
+three finenesses tell of the error is nothing where their panels are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,5 +63,14 @@ class ConductorBody:
         for triangles, faces in zip(self.shapes, self.faces, strict=True):
             extent = float(np.max(np.ptp(triangles.reshape(-1, 3), axis=0)))
             panels = graded(faces, _CELLS / fineness) if len(faces.edges) else faces.panels
+            panels = _triangles_halved(panels, round(2.0 * math.log2(_AS_THEY_ARE / fineness)))
             result.append(bounded(panels, np.full(len(panels.area), fineness * min(_LARGEST, _SHARE * extent))))
         return result
+
+
+def _triangles_halved(panels: Panels, times: int) -> Panels:
+    """Return panels whose triangles are halved some times, or not."""
+    done, triangles = chosen(panels, panels.four), chosen(panels, ~panels.four)
+    for _ in range(times):
+        triangles = halved(triangles)
+    return joined([done, triangles])

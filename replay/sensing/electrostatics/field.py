@@ -5,8 +5,8 @@ influences are means of theirs,
 
     dC = d_N + (d_N - d_N/2) / 2,    error = |dC - d_N| + (doubt_k + doubt_l + 1 %) |dC|,
 
-doubt what the extrapolation of phi makes; and where a diagonal entry's error is more than it may be, once more with
-2 N. Fewer unknowns make the increase smaller, never larger.
+doubt what the extrapolation of phi makes; and where a diagonal entry's error is more than it may be, and |dC - d_N| has
+a part in that, once more with 2 N. Fewer unknowns make the increase smaller, never larger.
 """
 
 from __future__ import annotations
@@ -38,6 +38,10 @@ _COMMON = 1e-2
 _LOOKS = 16
 """Poses of a block that decide into which pieces bodies are taken apart for E."""
 
+_MENDS = 0.25
+"""Share of `accuracy` that few nodes must cost for more of them to be taken: of what else makes an error they mend
+nothing."""
+
 _FLOOR = 0.1
 """Share of the largest diagonal entry below which an entry's error does not ask for more nodes."""
 
@@ -63,6 +67,7 @@ class FieldSolver:
     def __init__(self, unit: Unit, bodies: Sequence[ConductorBody], *, behind: bool, accuracy: float = 0.03) -> None:
         self.potential = unit.around
         self._accuracy = accuracy
+        self._common = self.potential.doubt[:, None] + self.potential.doubt + _COMMON
         self._sensors = len(unit.electrodes) - behind
         self._body_of_shape = np.repeat(np.arange(len(bodies)), [len(body.shapes) for body in bodies])
         self._trees = trees([triangles for body in bodies for triangles in body.shapes], pieces=True)
@@ -91,16 +96,20 @@ class FieldSolver:
             waiting = np.concatenate([first[~small], first[~small] + 1])
         return np.concatenate(done)
 
+    def solve(self, placement: PosedBodies, count: int) -> BemReading | None:
+        """Return what bodies change in one pose by so many nodes, and by half of them; None as of `read`."""
+        return self._read(placement, count)
+
     def read(self, placement: PosedBodies) -> BemReading | None:
         """Return what bodies change in one pose; None where conductors overlap so that no charges are an answer."""
         found = self._read(placement, _NODES)
         if found is None:
             return None
         own = found.increase.diagonal()[: self._sensors]
-        counts = own > _FLOOR * own.max()
-        if (found.error.diagonal()[: self._sensors][counts] > self._accuracy * own[counts]).any():
-            return self._read(placement, 2 * _NODES) or found
-        return found
+        error = found.error.diagonal()[: self._sensors]
+        few = error - self._common[: self._sensors].diagonal() * own
+        asks = (own > _FLOOR * own.max()) & (error > self._accuracy * own) & (few > _MENDS * self._accuracy * own)
+        return self._read(placement, 2 * _NODES) or found if asks.any() else found
 
     def _read(self, placement: PosedBodies, count: int) -> BemReading | None:
         with growing:
@@ -112,8 +121,7 @@ class FieldSolver:
             return None
         increase = 1.5 * fine.increase - 0.5 * coarse.increase
         shares = 1.5 * fine.shares - 0.5 * coarse.shares
-        doubt = self.potential.doubt[:, None] + self.potential.doubt + _COMMON
-        return BemReading(increase, np.abs(increase - fine.increase) + doubt * np.abs(increase), shares)
+        return BemReading(increase, np.abs(increase - fine.increase) + self._common * np.abs(increase), shares)
 
     def _systems(self, placement: PosedBodies, count: int) -> tuple[_System, _System] | None:
         """Return the equations with half as many nodes, and with all; None where no node is left."""

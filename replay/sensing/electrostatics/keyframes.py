@@ -4,13 +4,16 @@ A diagonal entry of the increase grows by orders of magnitude while a body comes
 
     E_k = sum over points j of the bodies, with area A_j,  of A_j phi_k(x_j)^2 / max(d_j, 3 mm),
 
-d_j the distance to the unit; their quotient hardly changes. So ln(dC_kk / E_k) is interpolated, E in every frame.
-Entries beside the diagonal and shares of shapes are interpolated over the root of the product of their diagonals.
+d_j the distance to the unit; their quotient changes little, and mostly as a power of E_k. So what is interpolated is
+ln(dC_kk / E_k), with ln E_k, which is known in every frame, as its guide (`spline.guided`). Entries beside the diagonal
+and shares of shapes are interpolated over the root of the product of their diagonals, guided by the mean of their ln E.
 
 A motion falls into pieces, at stops, jumps and kinks of the script, and where what touches or is resolved changes. Each
 begins with five keys. The frame in the middle between two keys is solved and compared with the prediction of all keys
 so far: while it is missed by more than the tolerance, both halves are asked in the next round. What the last question
-between two keys missed is the error in time there. Pieces know nothing of each other, nor of other blocks.
+between two keys missed is the error in time there. How far a frame is along a piece is its share of the frames, and how
+much ln E has changed, so that keys are dense where a body comes near. Pieces know nothing of each other, nor of other
+blocks.
 """
 
 from __future__ import annotations
@@ -24,11 +27,14 @@ import numpy as np
 
 from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.bem import BemReading
-from replay.sensing.electrostatics.spline import spline
+from replay.sensing.electrostatics.spline import guided
 
 Solve = Callable[[int], BemReading | None]
 
 _FIRST_KEYS = 5
+_EVEN = 2.0
+"""Change of ln E that counts as much as all frames of a piece."""
+
 _FLOOR = 5e-3
 """Share of the largest entry below which others need not be followed."""
 
@@ -61,26 +67,35 @@ def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
     """
     n = len(points)
     step = np.abs(np.diff(points, axis=0)).reshape(n - 1, -1).max(axis=1) if n > 1 else np.zeros(0)
-    bend = np.abs(np.diff(points, n=2, axis=0)).reshape(max(n - 2, 0), -1).max(axis=1) if n > 2 else np.zeros(0)
     cut = state[1:] != state[:-1]
+    kinks = _kinks(points, step)
     ends = []
     for i in range(n - 1):
         around = max(step[i - 1] if i else 0.0, step[i + 1] if i + 2 < n else 0.0)
         jumps = n > 2 and step[i] > 5.0 * around and step[i] > 0.0
-        if cut[i] or jumps:
+        # a kink between two frames bends the motion at both
+        if cut[i] or jumps or (kinks[i] and kinks[i + 1]):
             ends.append((i, i + 1))
-            continue
-        if i == 0:
-            continue
-        around = max(bend[i - 2] if i > 1 else 0.0, bend[i] if i < len(bend) else 0.0)
-        kinks = bend[i - 1] > 3.0 * around and bend[i - 1] > 0.02 * max(step[i - 1], step[i])
-        if kinks or (step[i] == 0.0) != (step[i - 1] == 0.0):
+        elif i > 0 and ((kinks[i] and not kinks[i - 1]) or (step[i] == 0.0) != (step[i - 1] == 0.0)):
             ends.append((i, i))
     first, result = 0, []
     for last, following in ends:
         result.append((first, last))
         first = following
     return [*result, (first, n - 1)]
+
+
+def _kinks(points: Floats, step: Floats) -> Flags:
+    """Return at which frames (n,) a motion bends more than on both sides of them, up to three frames away."""
+    n = len(points)
+    result = np.zeros(n, np.bool_)
+    if n > 2:
+        bend = np.zeros(n + 6)
+        bend[4 : n + 2] = np.abs(np.diff(points, n=2, axis=0)).reshape(n - 2, -1).max(axis=1)
+        around = np.min([np.maximum(bend[3 - k : n + 3 - k], bend[3 + k : n + 3 + k]) for k in (1, 2, 3)], axis=0)
+        own = bend[3 : n + 3]
+        result[1:-1] = (own > 3.0 * around)[1:-1] & (own[1:-1] > 0.02 * np.maximum(step[:-1], step[1:]))
+    return result
 
 
 def between_keys(solve: Solve, proxy: Floats, parts: list[tuple[int, int]], tolerance: float) -> Followed | None:
@@ -123,19 +138,23 @@ class _Piece:
     def __init__(self, reading: Solve, proxy: Floats, first: int, last: int) -> None:
         self._reading = reading
         self._proxy = proxy[first : last + 1]
+        self._guide = _each(math.log, self._proxy)
         self._first = first
         self._count = last - first + 1
+        change = np.abs(np.diff(self._guide, axis=0)).max(axis=1)
+        self._along = np.concatenate([[0.0], np.cumsum(change + _EVEN / max(self._count - 1, 1))])
         self._keys: dict[int, BemReading] = {}
 
     def followed(self, tolerance: float) -> Followed | None:
         """Return the readings of the piece."""
-        start = np.unique(np.linspace(0, self._count - 1, _FIRST_KEYS).round().astype(int)).tolist()
+        places = np.linspace(0.0, self._along[-1], _FIRST_KEYS)
+        start = np.unique(np.abs(self._along[:, None] - places).argmin(axis=0)).tolist()
         if not self._solve(start):
             return None
         waiting = [(a, b) for a, b in pairwise(start) if b - a > 1]
         missed = np.zeros(self._count)
         while waiting:
-            asked = [(a + b) // 2 for a, b in waiting]
+            asked = [self._middle(a, b) for a, b in waiting]
             predicted = self._predicted(np.array(asked, dtype=np.float64))[0]
             if not self._solve(asked):
                 return None
@@ -154,6 +173,11 @@ class _Piece:
         for key, value in self._keys.items():
             increase[key], error[key], shares[key], solved[key] = value.increase, value.error, value.shares, True
         return Followed(increase, error, shares, solved)
+
+    def _middle(self, first: int, last: int) -> int:
+        """Return the frame between two others that is as far along from both as can be."""
+        along = self._along[first + 1 : last]
+        return first + 1 + int(np.abs(2.0 * along - self._along[first] - self._along[last]).argmin())
 
     def _solve(self, frames: list[int]) -> bool:
         for frame in frames:
@@ -184,9 +208,10 @@ class _Piece:
         wrong = np.stack([each.error for each in readings]) / product
         beside = (value / product).reshape(m, -1)
         columns = np.concatenate([ratio, beside, share.reshape(m, -1)], axis=1)
-        places = np.array(keys, dtype=np.float64)
-        curve = spline(places, columns, at)
-        frames = at.astype(int)
+        places, frames = np.array(keys, dtype=np.float64), at.astype(int)
+        pairs = (0.5 * (self._guide[:, :, None] + self._guide[:, None, :])).reshape(self._count, -1)
+        guide = np.concatenate([self._guide, np.tile(pairs, 1 + share.shape[1])], axis=1)
+        curve = guided(places, columns, at, guide[keys], guide[frames])
         root = np.sqrt(_each(math.exp, curve[:, :k]) * self._proxy[frames])
         product = root[:, :, None] * root[:, None, :]
         increase = curve[:, k : k + k * k].reshape(-1, k, k)

@@ -11,6 +11,31 @@ import numpy as np
 
 from replay.numerics.arrays import Floats
 
+_UNSEEN = 1e-4
+"""Mean square of a guide about its straight line that counts half: what it tells of less is doubtful."""
+
+
+def guided(keys: Floats, values: Floats, at: Floats, guide: Floats, guide_at: Floats) -> Floats:
+    """Return the values (m, c) at m places of b guide + spline through n >= 1 keys.
+
+    b is, of each column, the slope by which values follow their guide, both taken from their straight lines over the
+    keys: what a guide that is known everywhere explains, with all its kinks, the spline need not follow.
+
+    Args:
+        keys, values, at: see `spline`.
+        guide, guide_at: (n, c) and (m, c), the guide at the keys and at the places.
+    """
+    e, y = _bent(keys, guide), _bent(keys, values)
+    slope = (e * y).sum(axis=0) / ((e * e).sum(axis=0) + _UNSEEN * len(keys))
+    return np.asarray(slope * guide_at + spline(keys, values - slope * guide, at))
+
+
+def _bent(keys: Floats, values: Floats) -> Floats:
+    """Return what is left of values (n, c) without their straight line of least squares."""
+    t = keys - keys.mean()
+    values = values - values.mean(axis=0)
+    return np.asarray(values - t[:, None] * ((t[:, None] * values).sum(axis=0) / max((t * t).sum(), 1e-300)))
+
 
 def spline(keys: Floats, values: Floats, at: Floats) -> Floats:
     """Return the values (m, c) at m places of splines through n >= 1 keys.

@@ -15,12 +15,15 @@ from typing import Any
 import numpy as np
 
 from replay.errors import InvalidValue
+from replay.geometry.tree import triangle_tree
 from replay.numerics.arrays import Floats, Integers
 from replay.sensing.electrostatics import cholesky
 from replay.sensing.electrostatics.faces import OPEN, Faces, faces_of
+from replay.sensing.electrostatics.gap import least_gap
 from replay.sensing.electrostatics.grading import cut_nodes, graded, grid
 from replay.sensing.electrostatics.influence import fill_influences, mean_potentials
 from replay.sensing.electrostatics.panels import Panels, chosen, joined
+from replay.sensing.electrostatics.placement import TOUCHING
 from replay.sensing.electrostatics.potential_grid import Potential
 from replay.sensing.electrostatics.products import products
 from replay.sensing.electrostatics.refinement import near_tree, point_sample, refined
@@ -93,6 +96,7 @@ class Unit:
         for electrode, found in zip(self.electrodes, self._faces, strict=True):
             if not found or not all(len(faces.panels.area) for faces in found):
                 raise InvalidValue(f"electrode {electrode.name!r}", "a surface without area", "must have area")
+        _check_apart(self.electrodes)
         every = [faces for found in self._faces for faces in found]
         self._plates = [faces for faces in every if len(faces.edges) == 1 and np.all(faces.edges == OPEN)]
         edges = [min(float(np.linalg.norm(f.panels.u)), float(np.linalg.norm(f.panels.v))) for f in self._plates]
@@ -218,6 +222,19 @@ class Unit:
             if a.max() > 0.0 and a.min() < 1.0 and b.max() > 0.0 and b.min() < 1.0:
                 found.append((height, (float(a.min()), float(a.max())), (float(b.min()), float(b.max()))))
         return found
+
+
+def _check_apart(electrodes: Sequence[Electrode]) -> None:
+    """Raise InvalidValue where two electrodes touch or overlap, with their names."""
+    surfaces = [np.ascontiguousarray(np.concatenate(electrode.surfaces)) for electrode in electrodes]
+    for b, later in enumerate(electrodes):
+        tree = triangle_tree(surfaces[b])
+        for a, earlier in enumerate(electrodes[:b]):
+            if least_gap(surfaces[a], surfaces[b], tree, TOUCHING).distance < TOUCHING:
+                names = f"{earlier.name}, {later.name}"
+                raise InvalidValue(
+                    "electrodes", names, "must not touch or overlap each other; leave a gap between them"
+                )
 
 
 def _apart(places: list[float], least: float) -> list[float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from replay.comparison.difference import DiffVerdict
-from replay.comparison.measured.source import MeasuredSource, compare_recording, load_map
+from replay.comparison.measured.source import MeasuredSource, compare_recording, compare_scenario, load_map
 from replay.comparison.rules_file import read_rules
 from replay.errors import ScenarioError, UndeterminedClockError
 from replay.recording.record import record
@@ -19,7 +19,8 @@ def beside(swing, log, text, *, rules="tolerances.yaml"):
     mapping.write_text(machine.map_of(text))
     source = MeasuredSource.of_files(log, *load_map(mapping))
     recording = swing / "run" / "swing.mcap"
-    return compare_recording(recording, source=source, rules=read_rules(swing / rules) if rules else None)
+    scenario = load(swing / "swing.yaml")
+    return compare_scenario(recording, scenario, source, rules=read_rules(swing / rules) if rules else None)
 
 
 def of(found, name):

@@ -1,14 +1,16 @@
 """Reports of a comparison with a machine: each says what the comparison says, and can be read again."""
 
+import dataclasses
 import json
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from replay.comparison.measured.measures import measures_of
 from replay.comparison.measured.outputs import MeasuredOutputs
-from replay.comparison.measured.report_text import lines
+from replay.comparison.measured.report_text import lines, of_signal
 from replay.comparison.measured.source import compare_recording
 from replay.comparison.rules_file import read_rules
 
@@ -44,6 +46,17 @@ def test_json_holds_everything(found):
 def test_text_is_the_same_every_time(swing, found):
     again = compare_recording(swing / "run" / "swing.mcap", rules=read_rules(swing / "tolerances.yaml"))
     assert list(lines(found, verbose=True)) == list(lines(again, verbose=True))
+
+
+def test_who_detects_is_told_where_one_alone_does(found):
+    told = [line for signal in found.signals for line in of_signal(signal)]
+    assert not any(line.startswith("detected in") for line in told), "where both do there is nothing to tell"
+    tip = found.signals[0]
+    there, both = tip.matched.measured_there.copy(), tip.matched.both
+    there[np.flatnonzero(tip.matched.enclosed & tip.matched.simulated_there)[:3]] = False
+    missed = dataclasses.replace(tip, matched=dataclasses.replace(tip.matched, measured_there=there))
+    (line,) = (line for line in of_signal(missed) if line.startswith("detected in"))
+    assert line == f"detected in {both - 3} frames by both, 0 only as measured, 3 only as simulated"
 
 
 def test_the_page_draws_each_signal_and_needs_nothing_else(written, off):

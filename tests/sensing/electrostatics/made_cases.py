@@ -1,9 +1,10 @@
-"""Conductors with known answers: the shared cases (tests/data/electrostatic_cases.json) and simple surfaces."""
+"""Conductors with known answers: the shared cases (replay/bench/conductors.json) and simple surfaces."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ PICO = FOUR_PI_EPSILON * 1e12
 
 CASES: dict[str, Any] = {
     case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "electrostatic_cases.json").read_text())["cases"]
+    for case in json.loads(resources.files("replay.bench").joinpath("conductors.json").read_text())["cases"]
 }
 
 

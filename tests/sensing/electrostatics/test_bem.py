@@ -25,8 +25,7 @@ def check_case(name: str) -> None:
     diagonal = np.diag(truth)
     counts = diagonal > 0.02 * diagonal.max()
     assert (np.abs(np.diag(value) - diagonal) <= 6e-3 * diagonal + np.diag(doubt))[counts].all()
-    # the estimate is too small for bare2, which is off by 2.7 of it beyond what is doubted of the truth
-    assert (np.abs(value - truth) <= 3.0 * error + doubt)[np.diag_indices(len(truth))][counts].all()
+    assert (np.abs(value - truth) <= error + doubt)[np.diag_indices(len(truth))][counts].all()
     main = np.max(diagonal[1:]) if len(diagonal) > 1 else diagonal[0]
     large = np.abs(truth) > 0.1 * main
     assert np.abs(value / truth - 1.0)[large].max() < 1.5e-2
@@ -54,7 +53,7 @@ def two_plates() -> Unit:
 def test_a_floating_body_is_neutral_and_every_increase_symmetric_and_above_0() -> None:
     unit = two_plates()
     placement = placed(ConductorBody("ball", (shifted(icosphere(0.03, 2), 0.01, 0.0, 0.06),), 0.0), gap=0.03)
-    found = bem._level(unit, placement, 1.5)
+    found = bem.level(unit, placement, 1.5)
     assert found is not None
     response = found[0]
     assert np.abs(response.charges.sum(axis=1)).max() < 1e-12 * np.abs(response.charges).sum(axis=1).min()
@@ -66,7 +65,7 @@ def test_a_floating_sphere_around_a_sphere_changes_nothing_and_a_grounded_one_wh
     unit = Unit([Electrode("ball", (icosphere(0.01, 2),))])
     shell = icosphere(0.03, 2)
     floating, grounded = (
-        bem._level(unit, placed(ConductorBody("shell", (shell,), earth)), 1.5) for earth in (0.0, np.inf)
+        bem.level(unit, placed(ConductorBody("shell", (shell,), earth)), 1.5) for earth in (0.0, np.inf)
     )
     assert floating is not None and grounded is not None
     increase = grounded[0].increase[0, 0]
@@ -78,7 +77,7 @@ def test_nothing_is_felt_behind_a_grounded_shell() -> None:
     unit = Unit([Electrode("ball", (icosphere(0.01, 1),))])
     shell = ConductorBody("shell", (icosphere(0.03, 2),))
     outside = ConductorBody("outside", (shifted(icosphere(0.02, 1), 0.08, 0.0, 0.0),))
-    alone, both = (bem._level(unit, placed(*bodies), 1.5) for bodies in ((shell,), (shell, outside)))
+    alone, both = (bem.level(unit, placed(*bodies), 1.5) for bodies in ((shell,), (shell, outside)))
     assert alone is not None and both is not None
     assert both[0].increase[0, 0] == pytest.approx(alone[0].increase[0, 0], rel=1e-4)
     assert abs(both[0].shares[1, 0, 0]) < 1e-3 * both[0].increase[0, 0]
@@ -88,7 +87,7 @@ def test_earth_goes_from_floating_to_grounded_and_shares_add_up() -> None:
     unit = two_plates()
     shapes = (shifted(icosphere(0.03, 2), 0.0, 0.0, 0.06), rectangle(0.05, 0.05, 0.12))
     found = [
-        bem._level(unit, placed(ConductorBody("both", shapes, earth)), 1.5) for earth in (0.0, 0.01, 1.0, 1e6, np.inf)
+        bem.level(unit, placed(ConductorBody("both", shapes, earth)), 1.5) for earth in (0.0, 0.01, 1.0, 1e6, np.inf)
     ]
     readings = [each[0] for each in found if each is not None]
     values = [reading.increase[0, 0] for reading in readings]
@@ -101,10 +100,10 @@ def test_earth_goes_from_floating_to_grounded_and_shares_add_up() -> None:
 def test_bodies_that_touch_are_one_conductor() -> None:
     unit = two_plates()
     halves = [shifted(rectangle(0.04, 0.08, 0.03), x, 0.0, 0.0) for x in (-0.02, 0.02)]
-    one = bem._level(unit, placed(ConductorBody("whole", (np.concatenate(halves),), 0.0)), 1.5)
+    one = bem.level(unit, placed(ConductorBody("whole", (np.concatenate(halves),), 0.0)), 1.5)
     parts = tuple(ConductorBody(str(k), (half,), 0.0) for k, half in enumerate(halves))
-    two = bem._level(unit, PosedBodies(parts, [np.eye(4)] * 2, np.zeros(2, np.int64), 5e-3), 1.5)
-    apart = bem._level(unit, placed(*parts), 1.5)
+    two = bem.level(unit, PosedBodies(parts, [np.eye(4)] * 2, np.zeros(2, np.int64), 5e-3), 1.5)
+    apart = bem.level(unit, placed(*parts), 1.5)
     assert one is not None and two is not None and apart is not None
     assert two[0].increase == pytest.approx(one[0].increase, rel=3e-2)  # of two meshes of one coarse level
     assert apart[0].increase[0, 0] < 0.8 * two[0].increase[0, 0]
@@ -113,8 +112,8 @@ def test_bodies_that_touch_are_one_conductor() -> None:
 def test_a_shape_that_is_there_twice_counts_once() -> None:
     unit = two_plates()
     plate = rectangle(0.06, 0.06, 0.03)
-    once = bem._level(unit, placed(ConductorBody("once", (plate,))), 1.5)
-    twice = bem._level(
+    once = bem.level(unit, placed(ConductorBody("once", (plate,))), 1.5)
+    twice = bem.level(
         unit, placed(ConductorBody("twice", (plate, plate[::-1], np.concatenate([plate, plate[:, ::-1]])))), 1.5
     )
     assert once is not None and twice is not None

@@ -12,6 +12,7 @@ import replay
 from replay.errors import ReplayError
 from replay.scenario.notes import notes
 from replay.sensing.capacitive.columns import CapacitiveColumns
+from replay.sensing.capacitive.part import CapacitiveMethod
 from replay.sensing.electrostatics import bem, unit
 
 SCENARIO = """
@@ -148,14 +149,22 @@ def test_frames_between_those_that_are_solved_are_within_their_error(tmp_path: P
 @pytest.mark.parametrize(
     ("sensor", "other", "rule"),
     [
-        ("ignore: [target]", "", "sensor 'right': ignore .* must ignore the same links as 'left'"),
-        ("back: [sheet], driven: true", "", "sensor 'right': driven .* must be as of 'left'"),
-        ("driven: true", ", driven: true", "driven .* has no effect: nothing is in `back`"),
+        ("ignore: [target]", "", r"\.right\.ignore must leave out the same links as of 'left', unlike target"),
+        ("back: [sheet], driven: true", "", r"\.right\.driven must be as of 'left'"),
+        ("driven: true", ", driven: true", r"\.left\.driven = true drives nothing"),
     ],
 )
-def test_units_that_make_no_sense_are_refused(tmp_path: Path, sensor: str, other: str, rule: str) -> None:
+def test_units_that_make_no_sense_are_refused_with_their_place(
+    tmp_path: Path, sensor: str, other: str, rule: str
+) -> None:
+    with pytest.raises(ReplayError, match=rf"plate\.yaml:\d+:\d+: sensors\.capacitive{rule}"):
+        replay.load(write(tmp_path, sensor=sensor, other=other))
+    file = write(tmp_path, sensor=sensor, other=other)
+    file.write_text(file.read_text().replace(f"method: {METHOD}", "method: tree"))
+    scenario = replay.load(file)
+    model = scenario.model.model_copy(update={"capacitive": CapacitiveMethod(method=METHOD)})
     with pytest.raises(ReplayError, match=rule):
-        read(tmp_path, sensor=sensor, other=other)
+        list(replay.simulate(scenario, model=model))
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ _TWO_LEVELS = 16.0
 11 from a node to its children."""
 
 
-@leaf_kernel
+@inlined_kernel
 def split_at_plane(clusters: Clusters, plate: PlacedPlate, room: Room) -> tuple[int, int, int]:
     """Put the nodes before the plate on the stack, and the triangles of leaves across z = 0 on the list of tasks.
 
@@ -163,7 +163,7 @@ def _settle_nodes(
     return waiting, judged, SumTally(tally.done, tally.spent, least, doubt)
 
 
-@leaf_kernel
+@inlined_kernel
 def _settle_triangles(
     triangles: Floats, plate: PlacedPlate, room: Room, waiting: int, allowed: float, scale: float, tally: SumTally
 ) -> tuple[int, float, SumTally]:
@@ -209,7 +209,7 @@ def _highest(triangles: Floats, k: int, plate: PlacedPlate) -> float:
     )
 
 
-@leaf_kernel
+@inlined_kernel
 def _open_worst(clusters: Clusters, budget: Budget, room: Room, tally: SumTally) -> tuple[int, int, float, SumTally]:
     """Open the worst parts, at least as much error as there is too much.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import inlined_kernel, kernel
+from replay.numerics.jit import inlined_kernel, record_like
 from replay.sensing.capacitive.tree.registers import (
     COLUMNS,
     ERROR,
@@ -47,7 +47,6 @@ class Queue(NamedTuple):
     state: Integers  # (3,) slots ever used, a bucket above which all are empty, first free slot or -1
 
 
-@kernel
 def new_queue(capacity: int) -> Queue:
     """Return room for so many parts, not yet `empty`."""
     return Queue(
@@ -134,7 +133,6 @@ class Room(NamedTuple):
     lanes: Floats  # (COLUMNS x LANES,)
 
 
-@kernel
 def new_room(n: int) -> Room:
     """Return the memory for a sum over n triangles."""
     return Room(
@@ -150,3 +148,6 @@ def new_room(n: int) -> Room:
         np.empty(LANES, np.int64),
         np.zeros(COLUMNS * LANES),
     )
+
+
+ROOM_TYPE = record_like(new_room(1))

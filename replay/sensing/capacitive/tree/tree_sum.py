@@ -28,9 +28,9 @@ from replay.sensing.capacitive.tree.clusters import CLUSTERS_TYPE, Clusters
 from replay.sensing.capacitive.tree.hard_triangles import sum_exactly, sum_hard
 from replay.sensing.capacitive.tree.opening import refine, split_at_plane
 from replay.sensing.capacitive.tree.part_sum import sum_of_parts
-from replay.sensing.capacitive.tree.parts import Room, empty, new_room
+from replay.sensing.capacitive.tree.parts import ROOM_TYPE, Room, empty, new_room
 from replay.sensing.capacitive.tree.registers import BEGIN, CENTROID, END, LANES, RADIUS, SECOND_CHILD, SIZE
-from replay.sensing.capacitive.tree.triangle_pieces import Pieces, new_pieces
+from replay.sensing.capacitive.tree.triangle_pieces import PIECES_TYPE, Pieces, new_pieces
 
 COUNTS = 4
 NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
@@ -38,8 +38,6 @@ NODES, CLUSTERS, IN_CLUSTERS, ALONE = range(COUNTS)
 by one; triangles behind the plate or facing away, left out node by node, are the rest."""
 
 
-@entry(CLUSTERS_TYPE, float64[:, :, :, ::1], float64[::1], float64[:, ::1], boolean, boolean, float64, int64[::1])
-@kernel
 def sum_tree(
     clusters: Clusters,
     T_plate_body: Floats,
@@ -62,12 +60,48 @@ def sum_tree(
     Returns:
         (n, p) [m], inf when saturated; (n, p) flags: touching; (n, p) [m], bound of the error (0 when saturated).
     """
+    shape = (len(T_plate_body), len(half_sizes))
+    integral, touching, bound = np.zeros(shape), np.zeros(shape, np.bool_), np.zeros(shape)
     room, pieces = new_room(len(clusters.triangles)), new_pieces()
-    n, plates = len(T_plate_body), len(half_sizes)
-    integral, touching = np.zeros((n, plates)), np.zeros((n, plates), np.bool_)
-    bound = np.zeros((n, plates))
-    for frame in range(n):
-        for plate in range(plates):
+    out = integral, touching, bound
+    sum_each(clusters, T_plate_body, rounding, half_sizes, both, facing, rtol, room, pieces, *out, counts)
+    return out
+
+
+@entry(
+    CLUSTERS_TYPE,
+    float64[:, :, :, ::1],
+    float64[::1],
+    float64[:, ::1],
+    boolean,
+    boolean,
+    float64,
+    ROOM_TYPE,
+    PIECES_TYPE,
+    float64[:, ::1],
+    boolean[:, ::1],
+    float64[:, ::1],
+    int64[::1],
+)
+@kernel
+def sum_each(
+    clusters: Clusters,
+    T_plate_body: Floats,
+    rounding: Floats,
+    half_sizes: Floats,
+    both: bool,
+    facing: bool,
+    rtol: float,
+    room: Room,
+    pieces: Pieces,
+    integral: Floats,
+    touching: Flags,
+    bound: Floats,
+    counts: Integers,
+) -> None:
+    """Do what `sum_tree` does, in arrays that it has made."""
+    for frame in range(len(T_plate_body)):
+        for plate in range(len(half_sizes)):
             half_x, half_y = half_sizes[plate, 0], half_sizes[plate, 1]
             here = placed_plate(
                 T_plate_body[frame, plate], half_x, half_y, both, facing, rounding[frame], clusters.blur
@@ -75,7 +109,6 @@ def sum_tree(
             integral[frame, plate], touching[frame, plate], bound[frame, plate] = _sum_one(
                 clusters, here, rtol, room, pieces, counts
             )
-    return integral, touching, bound
 
 
 @kernel

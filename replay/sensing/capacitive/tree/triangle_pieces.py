@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from replay.numerics.arrays import Floats, Integers
-from replay.numerics.jit import inlined_kernel, kernel, leaf_kernel
+from replay.numerics.jit import inlined_kernel, leaf_kernel, record_like
 from replay.numerics.triples import Triple
 from replay.sensing.capacitive.exact import SCRATCH
 from replay.sensing.capacitive.tree.registers import CORNERS, LANES, OWNER, PIECE_COLUMNS, SIZE
@@ -39,7 +39,6 @@ class Pieces(NamedTuple):
     scratch: Floats  # SCRATCH, of the closed form
 
 
-@kernel
 def new_pieces() -> Pieces:
     """Return memory for hard triangles and pieces."""
     return Pieces(
@@ -56,6 +55,9 @@ def new_pieces() -> Pieces:
         np.empty((3, 3)),
         np.empty(SCRATCH),
     )
+
+
+PIECES_TYPE = record_like(new_pieces())
 
 
 @inlined_kernel
