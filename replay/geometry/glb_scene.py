@@ -86,7 +86,7 @@ class GlbNode(_GlbEntry):
         return [number for part in parts for number in part or ()]
 
 
-class Roots(_GlbEntry):
+class SceneRoots(_GlbEntry):
     """The nodes that a scene begins with."""
 
     nodes: list[_Index] | None = None
@@ -101,7 +101,7 @@ class GlbScene(_GlbEntry):
     accessors: list[Accessor] = []
     meshes: list[GlbMesh] = []
     nodes: list[GlbNode] = []
-    scenes: list[Roots] | None = None
+    scenes: list[SceneRoots] | None = None
     scene: _Index | None = None
     extensionsRequired: list[str] = []
     extensionsUsed: list[str] = []

@@ -91,11 +91,11 @@ def compared(scene, samples, engine):
 
 
 def inside(first, pose_first, second, pose_second):
-    """Return whether one of up to 300 corners of one body is inside the other."""
+    """Return whether one of up to 300 corners of one body is inside the other, open or not, wound either way."""
     for a, pose_a, b, pose_b in ((first, pose_first, second, pose_second), (second, pose_second, first, pose_first)):
         into = np.linalg.inv(pose_a) @ pose_b
         corners = b.triangles.reshape(-1, 3)[:: 1 + len(b.triangles) // 100]
-        if any(winding(a.triangles, corner) > 0.5 for corner in corners @ into[:3, :3].T + into[:3, 3]):
+        if any(abs(winding(a.triangles, corner)) > 0.5 for corner in corners @ into[:3, :3].T + into[:3, 3]):
             return True
     return False
 
@@ -137,12 +137,12 @@ def scene_of(description, folder):
 @pytest.mark.parametrize("engine", ENGINES, ids=["fcl", "coal"])
 @pytest.mark.parametrize("description", descriptions(), ids=lambda path: "/".join(path.parts[-3:]))
 def test_public_robots_touch_themselves_where_others_say_so(description, engine, tmp_path):
-    """Of robots of at most 40 bodies; one that is refused is compared in `test_poses.py`."""
+    """Of robots of 2 to 40 bodies with a pair to test; one that is refused is compared in `test_poses.py`."""
     try:
         scene = scene_of(description, tmp_path)
     except ReplayError:
         return
-    if len(scene.bodies) <= 40:
+    if scene.pairs and len(scene.bodies) <= 40:
         _, same, total = compared(scene, 100, engine)
         assert same >= 0.95 * total
 
