@@ -49,7 +49,8 @@ class SignalFit:
         used: (m,) whether a sample lies between two frames that have a value.
         residual: (u,) of those, of measured size 1.
         off_lines: (u,) how far lines between frames may be off there.
-        off_jumps: (u,) how far by jumps, of which it is known between which frames and between which samples they are.
+        off_jumps: (u,) how far by jumps, of which it is known between which frames they are.
+        farther: (u,) by how many times this a jump may be off in time, as it is also between two samples.
         noise: standard deviation of both.
         scale: by which the simulated signal of size 1 is best multiplied.
         gain: logarithm of the likelihood over that of a constant; 0 where nothing can be said.
@@ -64,6 +65,7 @@ class SignalFit:
     residual: Floats
     off_lines: Floats
     off_jumps: Floats
+    farther: Floats
     noise: float
     scale: float
     gain: float
@@ -180,9 +182,11 @@ def _signal_at(trace: Trace, offset: float, drift: float, reference: float, drif
     off_lines = scale * trace.bends[at]
     intervals = np.diff(trace.log_time)
     sampled = np.maximum(np.append(0.0, intervals), np.append(intervals, 0.0))[used]
-    off_jumps = scale * trace.jumps[at] * (1.0 + sampled / np.diff(trace.time)[at])
+    off_jumps, farther = scale * trace.jumps[at], 1.0 + sampled / np.diff(trace.time)[at]
     noise = float(np.sqrt(squares / (count - 2) + np.mean(off_lines**2 + off_jumps**2)))
-    return SignalFit(trace, used, residual, off_lines, off_jumps, noise, scale, float(gain), y, s, smooth, exact)
+    return SignalFit(
+        trace, used, residual, off_lines, off_jumps, farther, noise, scale, float(gain), y, s, smooth, exact
+    )
 
 
 def refine(traces: Sequence[Trace], start: ClockFit, *, reach: float, close: float) -> ClockFit:
@@ -247,7 +251,7 @@ def spreads(fit: ClockFit) -> tuple[Spread, ...]:
             bins = sums.bins(time)
             left = signal.residual - (fit.step[:, None] * signal.smooth).sum(axis=0)
             sums.add(bins, weight, left, signal.noise, signal.columns)
-            sums.hide(weight, signal.off_lines, signal.off_jumps)
+            sums.hide(weight, signal.off_lines, signal.off_jumps * signal.farther)
             together = _products(whitening, signal.smooth.T)
             for row, column in zip(shared, together, strict=True):
                 row += np.bincount(bins, weight * column, BINS)

@@ -45,7 +45,7 @@ def _own_step(signal: SignalFit) -> tuple[float, Spread] | None:
     sums = SpreadSums(float(time[0]), float(time[-1]))
     bins = sums.bins(time)
     sums.add(bins, weight, signal.residual - step * smooth, signal.noise, signal.columns)
-    sums.hide(weight, signal.off_lines, signal.off_jumps)
+    sums.hide(weight, signal.off_lines, signal.off_jumps * signal.farther)
     spread = sums.spread(np.asarray([np.bincount(bins, weight * signal.noise * smooth / length, BINS)]))
     return (step, spread) if 0.0 < spread.deviation < np.inf else None
 

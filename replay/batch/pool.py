@@ -34,8 +34,8 @@ from replay.batch.worker import (
     Preparing,
     Raised,
     Ready,
+    Remark,
     Start,
-    Told,
     Work,
 )
 from replay.errors import InvalidValue, WorkerError
@@ -138,7 +138,7 @@ class Pool:
                     if worker not in workers:
                         continue  # it has been stopped; this was still on its way
                     match message:
-                        case Told(text):
+                        case Remark(text):
                             if text not in told:  # by another worker
                                 told.add(text)
                                 self._tell(text)

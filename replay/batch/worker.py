@@ -52,7 +52,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Told:
+class Remark:
     """A remark for the user while the worker prepares itself."""
 
     text: str
@@ -107,7 +107,7 @@ class Messages:
 
     def tell(self, text: str) -> None:
         """Tell the user something."""
-        self._answer(Told(text))
+        self._answer(Remark(text))
 
     def progress(self, state: object) -> None:
         """Tell how far it is."""
@@ -146,7 +146,7 @@ def main(ahead: Sequence[str]) -> None:
         try:
             start.prepare(Messages(answer))
         except Exception as error:  # a task that has the same trouble will say so itself
-            answer(Told(f"a worker could not prepare itself: {error!r}"))
+            answer(Remark(f"a worker could not prepare itself: {error!r}"))
     gc.freeze()
     gc.set_threshold(often, *others)
     answer(Ready())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from replay.collision import broad, narrow, way_sieve
-from replay.collision.bodies import Bodies, Volumes
+from replay.collision.bodies import Volumes
 from replay.collision.counters import Counters
 from replay.collision.engines import NarrowPhase
 from replay.collision.intervals import Intervals, Sorted
@@ -81,7 +81,7 @@ class FrameDecider:
     """Levels and clearances of a batch's pairs at frames: sieved by bounding volumes, the rest decided by an engine.
 
     Attributes:
-        bodies, volumes: of all pairs.
+        roots, volumes: of all pairs.
         limit: largest clearance that is asked for [m].
         savings: see `pipeline.CollisionPipeline`.
         turning: whether boxes turn with the first body's link.
@@ -89,7 +89,7 @@ class FrameDecider:
         counters: what it costs is added to them.
     """
 
-    bodies: Bodies
+    roots: way_sieve.Roots
     volumes: Volumes
     limit: float
     savings: bool
@@ -116,9 +116,10 @@ class FrameDecider:
         by_ways = found if self.savings and self.by_ways else None
         chosen = wanted = None
         if found is not None:
-            chosen, place = np.unique(rows[:, 2], return_inverse=True)
-            rows = rows.copy()
-            rows[:, 2] = place
+            asked = np.zeros(batch.relative.count, dtype=bool)
+            asked[rows[:, 2]] = True
+            chosen, rows = np.flatnonzero(asked), rows.copy()
+            rows[:, 2] = (np.cumsum(asked) - 1)[rows[:, 2]]
         if by_ways is not None:
             wanted = by_ways.wanted[chosen]
         relative = batch.relative.of(poses.local, chosen, wanted)
@@ -130,7 +131,7 @@ class FrameDecider:
         scratch, limit = np.zeros((8, 4)), self.limit
         if by_ways is not None:
             way_sieve.sieve_by_way(
-                self.bodies,
+                self.roots,
                 self.volumes,
                 frames,
                 by_ways.kinds[by_ways.near],

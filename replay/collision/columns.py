@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Annotated
 
 import numpy as np
@@ -68,6 +69,7 @@ class Crossings:
     __hash__ = None  # type: ignore[assignment]
 
     @staticmethod
+    @cache
     def none() -> Crossings:
         """Return no entries."""
         empty = np.zeros(0, dtype=np.int64)

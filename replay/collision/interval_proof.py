@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64, int64, uint8
 
-from replay.collision.bodies import AABB, BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
+from replay.collision.bodies import AABB, VOLUMES_TYPE, Volumes
 from replay.collision.broad import volumes_meet
 from replay.collision.crossing_look import BOUNDS_DOUBT, CONTACT_DOUBT, proven_distance
 from replay.collision.pair_frames import PAIR_FRAMES_TYPE, PairFrames
 from replay.collision.volume_gap import boxes_gap
-from replay.collision.way_sieve import root_gap, root_ratio
+from replay.collision.way_sieve import ROOTS_TYPE, Roots, root_gap, root_ratio
 from replay.collision.ways import FAR, NEAR, QUIET, WAYS_TYPE, Ways, center_gap, fill_ways, stretch
 from replay.kinematics.linkage import POSE_ROUNDING
 from replay.kinematics.timeline import TIMELINE_TYPE, Timeline
@@ -38,7 +38,7 @@ _ABOVE = 1.0 + 2.0**-30
 
 
 @entry(
-    BODIES_TYPE,
+    ROOTS_TYPE,
     VOLUMES_TYPE,
     int64[:, ::1],
     float64[:, :, :, ::1],
@@ -55,7 +55,7 @@ _ABOVE = 1.0 + 2.0**-30
 )
 @leaf_kernel
 def sort_out(
-    bodies: Bodies,
+    roots: Roots,
     volumes: Volumes,
     pairs: Integers,
     middle: Floats,
@@ -73,7 +73,7 @@ def sort_out(
     """Find out which pairs a stretch need not be looked at for, by its middle frame and all that moves in it.
 
     Args:
-        bodies, volumes: of the scene.
+        roots, volumes: of the scene.
         pairs: (P, 4) as `PairFrames.pairs`.
         middle: (Q, K, 4, 4) T_a_b of the links in the middle frames of the K stretches.
         rows: (P, 4) as of `certify`.
@@ -103,8 +103,8 @@ def sort_out(
                 error += 2.0**-43 * size
                 left -= way + error  # from the end of the stretch before to the middle
                 if not left > way + error:
-                    root = root_gap(bodies, a, b, middle[q, k], size, rotation, translation) - limit
-                    left = root / root_ratio(bodies, volumes, a, b)
+                    root = root_gap(roots, a, b, middle[q, k], size, rotation, translation) - limit
+                    left = root / root_ratio(roots, volumes, a, b)
                     if left > way + error:
                         left = min(left, boxes_gap(volumes, a, b, middle[q, k], rotation, scratch))
                 left -= way + error

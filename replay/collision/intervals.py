@@ -16,6 +16,7 @@ from replay.collision.crossing_look import Questions
 from replay.collision.interval_proof import Answers
 from replay.collision.pair_frames import PairFrames
 from replay.collision.support import Sets, make_sets
+from replay.collision.way_sieve import roots_of
 from replay.collision.way_steps import Chains
 from replay.collision.ways import NEAR, STRETCH, Ways, fill_stretches, first_ways, no_ways
 from replay.kinematics.linkage import Linkage, LinkPoses
@@ -125,7 +126,7 @@ class Intervals:
         self._linkage = linkage
         self._line = timeline(linkage, motion)
         self._bodies, self._volumes, self._links = bodies, volumes, links
-        self._corners = _corners(volumes)
+        self._corners, self._roots = _corners(volumes), roots_of(bodies)
         self._limit, self._cap, self._savings = limit, cap, savings
         self._counters = counters
         self._first = first_ways(links, self._line)
@@ -195,7 +196,7 @@ class Intervals:
             return Sorted(pairs, rows, np.full(shape, NEAR, dtype=np.uint8), wanted, course)
         kinds = np.empty(shape, dtype=np.uint8)
         interval_proof.sort_out(
-            self._bodies,
+            self._roots,
             self._volumes,
             pairs,
             batch.relative.of(course.middle),
@@ -258,13 +259,13 @@ class Intervals:
         self, frames: PairFrames, course: Course, columns: Integers, doubt: Bytes, told: Told, counts: Integers
     ) -> Crossings:
         f, p = np.nonzero(doubt)
-        bodies = frames.pairs[p, :2]
+        bodies = frames.pairs[p, :2].copy()
         chains, chain = self._chains(self._links[bodies])
         questions = Questions(
-            bodies=np.ascontiguousarray(bodies),
+            bodies=bodies,
             chain=chain,
-            time=np.ascontiguousarray(np.stack([course.time[f], course.time[f + 1]], axis=1)),
-            level=np.ascontiguousarray(np.stack([frames.level[f, p], frames.level[f + 1, p]], axis=1)),
+            time=np.array([course.time[f], course.time[f + 1]]).T.copy(),
+            level=np.array([frames.level[f, p], frames.level[f + 1, p]]).T.copy(),
             doubt=doubt[f, p],
         )
         cells = f + told.begin, columns[p]

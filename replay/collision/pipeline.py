@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from replay.collision import narrow
+from replay.collision import narrow, way_sieve
 from replay.collision.batches import Batch, FrameDecider, batches
 from replay.collision.bodies import Bounds, Pieces, collect, fit_volumes
 from replay.collision.candidates import near_pairs
@@ -123,7 +123,7 @@ class CollisionPipeline:
                     counters=self.counters,
                 )
             self._frames = FrameDecider(
-                arrays,
+                way_sieve.roots_of(arrays),
                 self._volumes,
                 self._limit,
                 savings=savings,
@@ -170,14 +170,14 @@ class CollisionPipeline:
         self._check(poses)
         course = told = None
         rest = self._at_rest(poses)
-        level, clearance = np.repeat(rest.level, n, axis=0), np.repeat(rest.clearance, n, axis=0)
-        evaluated, undecided = np.repeat(rest.evaluated, n, axis=0), np.repeat(rest.undecided, n, axis=0)
+        level, clearance = rest.level.repeat(n, axis=0), rest.clearance.repeat(n, axis=0)
+        evaluated, undecided = rest.evaluated.repeat(n, axis=0), rest.undecided.repeat(n, axis=0)
         if self._intervals is None or time is None or len(time) < 2:
             between = np.broadcast_to(np.uint8(Between.NOT_LOOKED), level.shape)
             bound = np.broadcast_to(np.nan, level.shape)
         else:
             course = self._intervals.course(poses, lead, time, first)
-            between, bound = np.repeat(rest.between, n, axis=0), np.repeat(rest.bound, n, axis=0)
+            between, bound = rest.between.repeat(n, axis=0), rest.bound.repeat(n, axis=0)
             between[: 1 - lead], bound[: 1 - lead] = Between.NOT_LOOKED, np.nan
             told = Told(between, bound, 1 - lead)
             self.counters.intervals += (len(time) - 1) * self._pairs.count

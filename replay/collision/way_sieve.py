@@ -11,10 +11,11 @@ the pair is clear and the narrow phase would end at the roots, having found noth
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from numba import float64, int64, uint8
 
-from replay.collision.bodies import BODIES_TYPE, VOLUMES_TYPE, Bodies, Volumes
+from replay.collision.bodies import VOLUMES_TYPE, Bodies, Volumes
 from replay.collision.broad import (
     BY_BLOCK,
     BY_REPEAT,
@@ -31,14 +32,31 @@ from replay.collision.traversal import box_gap
 from replay.collision.volume_gap import boxes_gap
 from replay.collision.ways import NEAR, STRETCH
 from replay.numerics.arrays import Bytes, Floats, Integers
-from replay.numerics.jit import entry, leaf_kernel
+from replay.numerics.jit import entry, leaf_kernel, record
 
 _SLACK = 2.0**-43
 """Of the lengths that enter a gap: above the rounding of two of them."""
 
 
+class Roots(NamedTuple):
+    """What is asked of B bodies here, a row each, called as in `Bodies`: the boxes at the roots of their trees."""
+
+    node_center: Floats  # (B, 3) [m]
+    node_half: Floats  # (B, 3) [m]
+    reach: Floats  # (B,) [m]
+
+
+ROOTS_TYPE = record(Roots, float64[:, ::1], float64[:, ::1], float64[::1])
+
+
+def roots_of(bodies: Bodies) -> Roots:
+    """Return the boxes at the roots of bodies' trees."""
+    first = bodies.node_first[:-1]
+    return Roots(bodies.node_center[first], bodies.node_half[first], bodies.reach)
+
+
 @entry(
-    BODIES_TYPE,
+    ROOTS_TYPE,
     VOLUMES_TYPE,
     PAIR_FRAMES_TYPE,
     uint8[:, ::1],
@@ -53,7 +71,7 @@ _SLACK = 2.0**-43
 )
 @leaf_kernel
 def sieve_by_way(
-    bodies: Bodies,
+    roots: Roots,
     volumes: Volumes,
     frames: PairFrames,
     kinds: Bytes,
@@ -69,7 +87,7 @@ def sieve_by_way(
     """Fill level and task of pairs in frames as `broad.sieve` does, in stretches in which they are NEAR.
 
     Args:
-        bodies, volumes: of the scene; no boxes along the world's axes, whose way is another.
+        roots, volumes: of the scene; no boxes along the world's axes, whose way is another.
         frames: level and task are written; in other stretches they stay as they are, 0 and SKIP.
         kinds: (P, K) of `interval_proof.sort_out`.
         rows: of the pairs, as of `interval_proof.certify`.
@@ -82,7 +100,7 @@ def sieve_by_way(
     pairs, poses, level, task = frames.pairs, frames.poses, frames.level, frames.task
     for p in range(len(pairs)):
         a, b, q = pairs[p, 0], pairs[p, 1], pairs[p, 2]
-        ratio = root_ratio(bodies, volumes, a, b)
+        ratio = root_ratio(roots, volumes, a, b)
         last, left = len(level) - 1, 0.0
         for f in range(last + 1):
             # before a frame and after it lie two intervals, and it is looked at for either
@@ -102,7 +120,7 @@ def sieve_by_way(
                 counts[BY_REPEAT] += 1
                 level[f, p], task[f, p] = level[f - 1, p], REPEAT
                 continue
-            size = bodies.reach[a] + bodies.reach[b]
+            size = roots.reach[a] + roots.reach[b]
             size += math.sqrt(pose[0, 3] ** 2 + pose[1, 3] ** 2 + pose[2, 3] ** 2)
             margin = error + _SLACK * (size + volumes.radius[a] + volumes.radius[b])
             gap = sphere_gap(volumes, a, b, pose)
@@ -110,12 +128,12 @@ def sieve_by_way(
                 counts[BY_SPHERE] += 1
                 left = gap - margin
                 if limit > 0.0:
-                    root = root_gap(bodies, a, b, pose, size, rotation, translation)
+                    root = root_gap(roots, a, b, pose, size, rotation, translation)
                     left = min(gap, (root - limit) / ratio) - margin
             elif volumes_meet(volumes, a, b, pose, frames.turns[0, f], scratch):
                 level[f, p], task[f, p] = 1, RUN
             elif limit > 0.0:
-                root = root_gap(bodies, a, b, pose, size, rotation, translation)
+                root = root_gap(roots, a, b, pose, size, rotation, translation)
                 if root > limit:
                     counts[BY_VOLUME] += 1
                     left = (
@@ -130,28 +148,28 @@ def sieve_by_way(
 
 
 @leaf_kernel
-def root_ratio(bodies: Bodies, volumes: Volumes, a: int, b: int) -> float:
+def root_ratio(roots: Roots, volumes: Volumes, a: int, b: int) -> float:
     """Return by how much a way that bodies take may shorten the gap of the boxes at their roots: sqrt(3) k."""
-    return math.sqrt(3.0) * max(1.0, _ratio(bodies, volumes, a), _ratio(bodies, volumes, b))
+    return math.sqrt(3.0) * max(1.0, _ratio(roots, volumes, a), _ratio(roots, volumes, b))
 
 
 @leaf_kernel
-def _ratio(bodies: Bodies, volumes: Volumes, body: int) -> float:
+def _ratio(roots: Roots, volumes: Volumes, body: int) -> float:
     """Return how much larger a sphere about the body's centre is that holds the box at the root of its tree."""
-    row, square, away = bodies.node_first[body], 0.0, 0.0
+    square, away = 0.0, 0.0
     for i in range(3):
-        square += bodies.node_half[row, i] ** 2
-        away += (bodies.node_center[row, i] - volumes.center[body, i]) ** 2
+        square += roots.node_half[body, i] ** 2
+        away += (roots.node_center[body, i] - volumes.center[body, i]) ** 2
     radius: float = volumes.radius[body]
     return (math.sqrt(square) + math.sqrt(away)) * (1.0 + 2.0**-40) / radius if radius > 0.0 else math.inf
 
 
 @leaf_kernel
-def root_gap(bodies: Bodies, a: int, b: int, pose: Floats, size: float, rotation: Floats, translation: Floats) -> float:
+def root_gap(roots: Roots, a: int, b: int, pose: Floats, size: float, rotation: Floats, translation: Floats) -> float:
     """Return what `traversal.closest` computes of the boxes at the roots [m]."""
     for i in range(3):
         translation[i] = pose[i, 3]
         for j in range(3):
             rotation[i, j] = pose[i, j]
-    row_a, row_b = bodies.node_first[a], bodies.node_first[b]
-    return float(box_gap(bodies, row_a, row_b, rotation, translation, 2.0 * ROUNDING * size))
+    slack = 2.0 * ROUNDING * size
+    return float(box_gap(roots, a, b, rotation, translation, slack))  # type: ignore[arg-type]  # reads boxes alone

@@ -6,6 +6,7 @@ import math
 import struct
 
 from replay import limits
+from replay.geometry.glb_corners import EXTENSION, with_float_corners
 from replay.geometry.glb_scene import GlbScene, read_scene
 
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
@@ -27,17 +28,17 @@ def bare(data: bytes) -> bytes:
             more than is read.
     """
     scene, binary = _chunks(data)
-    size = len(binary)
     _check_extensions(scene)
     try:
-        _check_buffers(scene, size)
+        _check_buffers(scene, len(binary))
+        binary = with_float_corners(scene, binary)
         _check_geometry(scene)
     except IndexError:
         raise ValueError("its description is not glTF 2: it refers to an entry that is not there") from None
     _check_nodes(scene)
     text = scene.text().encode()
     text += b" " * (-len(text) % 4)
-    rest = struct.pack("<2I", size, _BINARY) + binary if size else b""
+    rest = struct.pack("<2I", len(binary), _BINARY) + binary if binary else b""
     return b"glTF" + struct.pack("<4I", 2, 20 + len(text) + len(rest), len(text), _JSON) + text + rest
 
 
@@ -64,7 +65,7 @@ def _chunks(data: bytes) -> tuple[GlbScene, bytes]:
 
 
 def _check_extensions(scene: GlbScene) -> None:
-    needed = [name for name in scene.extensionsRequired if not name.startswith(_HARMLESS)]
+    needed = [name for name in scene.extensionsRequired if not name.startswith(_HARMLESS) and name != EXTENSION]
     needed += [name for name in scene.extensionsUsed if name == "EXT_mesh_gpu_instancing"]
     if needed:
         raise ValueError(f"it needs the extension {needed[0][:60]}, which is not read; export it without compression")

@@ -45,6 +45,7 @@ class Accessor(_GlbEntry):
     count: Annotated[int, Field(ge=1, lt=1 << 53)]
     bufferView: _Index | None = None
     byteOffset: _Size = 0
+    normalized: bool = False
     sparse: dict[str, Any] | None = None
 
 
@@ -85,7 +86,7 @@ class GlbNode(_GlbEntry):
         return [number for part in parts for number in part or ()]
 
 
-class Roots(_GlbEntry):
+class SceneRoots(_GlbEntry):
     """The nodes that a scene begins with."""
 
     nodes: list[_Index] | None = None
@@ -100,7 +101,7 @@ class GlbScene(_GlbEntry):
     accessors: list[Accessor] = []
     meshes: list[GlbMesh] = []
     nodes: list[GlbNode] = []
-    scenes: list[Roots] | None = None
+    scenes: list[SceneRoots] | None = None
     scene: _Index | None = None
     extensionsRequired: list[str] = []
     extensionsUsed: list[str] = []

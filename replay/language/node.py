@@ -24,6 +24,10 @@ class Place:
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"
 
+    def __reduce__(self) -> tuple[type[Place], tuple[str, int, int]]:
+        """Trees of thousands of these are pickled, and dataclasses with slots look up all their fields for each."""
+        return Place, (self.file, self.line, self.column)
+
     def problem(self, message: str) -> Problem:
         """Return what is wrong here."""
         return Problem(message, file=self.file, line=self.line, column=self.column)
@@ -48,6 +52,10 @@ class Node:
     text: str = ""
     size: int = 1
     whole: bool = True
+
+    def __reduce__(self) -> tuple[type[Node], tuple[Any, ...]]:
+        """See `Place`; a tree has no cycles."""
+        return Node, (self.place, self.value, self.keys, self.text, self.size, self.whole)
 
     @property
     def mapping(self) -> dict[str, Node]:

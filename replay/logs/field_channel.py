@@ -147,6 +147,8 @@ class FieldChannel:
 
     def _stamp(self, message: Any) -> int:
         for path in _STAMPS:
+            if path[0] not in message:
+                continue
             found: Any = message
             for step in path:
                 found = found.get(step) if type(found) is dict or isinstance(found, Mapping) else None

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,13 @@ class Siblings:
     steps: tuple[int | str, ...]
     paths: tuple[str, ...]
     at: list[int] = field(default_factory=list)
-    rows: list[tuple[Any, ...]] = field(default_factory=list)
+    rows: list[Sequence[Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._kind = dict if isinstance(self.steps[0], str) else list
-        self._first_of = itemgetter(*self.steps, self.steps[0])  # of two at least: of one it returns no tuple
+        numbers = [step for step in self.steps if isinstance(step, int)]
+        self._kind: Any = list if numbers else dict
+        in_a_row = bool(numbers) and numbers == [*range(numbers[0], numbers[0] + len(numbers))]
+        self._part = slice(numbers[0], numbers[-1] + 1) if in_a_row else None
 
     def take(self, k: int, message: Any) -> None:
         """Take the values of message k."""
@@ -43,11 +44,13 @@ class Siblings:
         self.at.append(k)
         if type(found) is self._kind:
             try:
-                self.rows.append(self._first_of(found)[:-1])
-                return
+                row = found[self._part] if self._part else tuple(map(found.__getitem__, self.steps))
             except (IndexError, KeyError):
-                pass  # some are missing
-        self.rows.append(tuple(below(found, step, None) for step in self.steps))
+                row = ()
+            if len(row) == len(self.steps):
+                self.rows.append(row)
+                return
+        self.rows.append([below(found, step, None) for step in self.steps])  # some are missing
 
     def table(self) -> Floats | None:
         """Return the rows as an array; None if not all are plain numbers."""

@@ -10,7 +10,7 @@ import dataclasses
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
@@ -43,7 +43,7 @@ def kept(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     def ask(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         global _total  # noqa: PLW0603
         try:
-            parts = [*_content((args, kwargs))]
+            parts = _content((args, kwargs))
         except TypeError:  # the function says what is wrong with them
             return function(*args, **kwargs)
         if sum(map(len, parts)) > _LARGEST:
@@ -77,25 +77,31 @@ def forget() -> None:
         _total = 0
 
 
-def _content(value: Any) -> Iterator[memoryview | bytes]:
-    """Yield what tells a value from others, in bytes."""
+def _content(value: Any) -> list[memoryview | bytes]:
+    """Return what tells a value from others, in bytes."""
+    parts: list[memoryview | bytes] = []
+    _add_content(value, parts)
+    return parts
+
+
+def _add_content(value: Any, parts: list[memoryview | bytes]) -> None:
     if isinstance(value, np.ndarray):
-        yield f"{value.dtype.str}{value.shape}".encode()
-        yield np.ascontiguousarray(value).reshape(-1).view(np.uint8).data
+        parts.append(f"{value.dtype.str}{value.shape}".encode())
+        parts.append(np.ascontiguousarray(value).reshape(-1).view(np.uint8).data)
     elif isinstance(value, bytes):
-        yield f"{len(value)} bytes".encode()
-        yield value
+        parts.append(f"{len(value)} bytes".encode())
+        parts.append(value)
     elif value is None or isinstance(value, str | int | float | np.generic):
-        yield f"{type(value).__name__} {value!r}".encode()
+        parts.append(f"{type(value).__name__} {value!r}".encode())
     elif isinstance(value, dict):
-        yield from _content(tuple(value.items()))
+        _add_content(tuple(value.items()), parts)
     elif isinstance(value, tuple | list):
-        yield f"{type(value).__name__} {len(value)}".encode()
+        parts.append(f"{type(value).__name__} {len(value)}".encode())
         for part in value:
-            yield from _content(part)
+            _add_content(part, parts)
     elif dataclasses.is_dataclass(value):
-        yield type(value).__name__.encode()
+        parts.append(type(value).__name__.encode())
         for entry in dataclasses.fields(value):
-            yield from _content(getattr(value, entry.name))
+            _add_content(getattr(value, entry.name), parts)
     else:
         raise TypeError(f"{type(value).__name__} is nothing that answers are kept for")

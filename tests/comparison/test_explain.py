@@ -52,7 +52,7 @@ def test_a_capacitance_is_told_with_its_shares(recorded, capsys):
     listed = text.partition("share:\n")[2].splitlines()
     assert listed[0].split()[0] == largest and f"({shares.max() / shares.sum():.1%})" in listed[0]
     assert "capacitive.tree@" in text and "capacitive.exact@" in text
-    assert "capacitive.bem@1: takes seconds; --slow asks it too" in text
+    assert "capacitive.bem@2: takes seconds; --slow asks it too" in text
 
 
 def test_a_pair_is_told_with_its_closest_triangles_and_all_versions(recorded, capsys):

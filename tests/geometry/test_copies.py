@@ -137,6 +137,13 @@ def test_copies_that_rounding_has_parted_are_seen(sense) -> None:
     assert len(apart.triangles) == 2 * len(ball)
 
 
+@pytest.mark.parametrize(("apart", "sheets"), [(0.9e-9, 1), (1.1e-9, 2)])
+def test_copies_are_one_up_to_a_billionth_of_the_extent(apart, sheets) -> None:
+    box = primitives.cube(1.0).triangles  # without its lid, and with a floor that is there twice
+    solid = solid_from_triangles(np.concatenate([box[:2], box[4:], box[:2] - [0.0, 0.0, apart]]))
+    assert len(solid.triangles) == 8 + 2 * sheets
+
+
 def test_a_copy_parted_by_a_few_products_leaves_a_body_closed() -> None:
     # a robot's body was "open": two corners of a quad that was there twice were 8e-12 of its extent apart
     cube = primitives.cube(1.0).triangles

@@ -15,6 +15,7 @@ from replay.geometry.mesh_file import FORMATS, read_faces
 from tests.amounts import cases
 
 BOX = trimesh.creation.box()
+CODES = {"i1": 5120, "u1": 5121, "<i2": 5122, "<u2": 5123}
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
 QUADS = (
     b"element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face FACES\n"
@@ -152,10 +153,45 @@ def doubled(scene):
         (set_in("nodes", 0, "children", value=[0]), "a node is within itself"),
         (set_in("nodes", 0, "scale", value=[1, float("nan"), 1]), "node 0 has a transform that is not finite"),
         (doubled, "has two parents"),
+        (set_in("scenes", 0, "nodes", value=[99]), "a scene begins with a node that is not there"),
+        (set_in("scene", value=9), "its scene is not there"),
     ],
 )
 def test_glb_that_would_be_read_in_part_or_fill_the_memory_is_refused(change, words):
     assert words in refused("box.glb", glb(change))
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "<i2", "<u2"])
+@pytest.mark.parametrize("shares", [False, True])
+def test_corners_in_whole_numbers_are_where_their_node_puts_them(kind, shares):
+    """As gltfpack writes them: rows of four bytes' multiples, and a node that gives them their size."""
+    largest = np.iinfo(kind).max
+    points = np.random.default_rng(3).integers(np.iinfo(kind).min, largest, (3, 3), endpoint=True)
+    points[0] = np.iinfo(kind).min
+    rows = np.zeros((3, 4), kind)
+    rows[:, :3] = points
+
+    def change(scene):
+        view = scene["bufferViews"][scene["accessors"][1]["bufferView"]]
+        view |= {"byteLength": rows.nbytes, "byteStride": rows.strides[0]}
+        scene["accessors"][1] = {"bufferView": scene["accessors"][1]["bufferView"], "componentType": CODES[kind]}
+        scene["accessors"][1] |= {"type": "VEC3", "count": 3, "normalized": shares}
+        part = scene["meshes"][0]["primitives"][0]
+        part["attributes"] = {"POSITION": 1}
+        del part["indices"]
+        scene["nodes"].append({"mesh": 0, "scale": [2.0, 2.0, 2.0], "translation": [1.0, 0.0, -1.0]})
+        scene["scenes"][0]["nodes"] = [len(scene["nodes"]) - 1]
+        scene["extensionsRequired"] = scene["extensionsUsed"] = ["KHR_mesh_quantization"]
+
+    data = bytearray(glb(change))
+    size = int.from_bytes(data[12:16], "little")
+    view = json.loads(data[20 : 20 + size])["bufferViews"][1]
+    begin = 20 + size + 8 + view.get("byteOffset", 0)
+    data[begin : begin + rows.nbytes] = rows.tobytes()
+    vertices, faces = read_faces("packed.glb", bytes(data))
+    shown = np.maximum(points / largest, -1.0) if shares else points
+    np.testing.assert_allclose(vertices[faces[0]], 2.0 * shown + [1.0, 0.0, -1.0], rtol=1e-6, atol=1e-6)
+    assert len(faces) == 1
 
 
 def test_obj_counts_back_from_where_a_face_stands_and_splits_polygons():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from replay.errors import RecordingError
-from replay.logs.field_log import read_fields
+from replay.logs.field_log import in_window, read_fields
 from replay.logs.message_log import open_message_log
 from tests.logs import made_logs
 from tests.logs.made_logs import Said
@@ -124,6 +124,7 @@ def test_leading_stamps_of_zero_are_left_out():
         ([(1, {"d": "far"})], ("/a", "d"), "d is no number but text"),
         ([(1, {"d": [1, 2]})], ("/a", "d"), r"a list: name one of its 2 values, such as d\[0\]"),
         ([(1, {"d": {"x": 1}})], ("/a", "d"), "no number but a message"),
+        ([(1, {"d": [{"x": 1}, {"x": 2}]})], ("/a", "d[1]"), "no number but a message"),
         ([(7, {"d": 1}), (7, {"d": 2})], ("/a", "d"), "has two values at 7e-09 s: 1 and 2"),
         ([(2**62 + 1, {"d": 1})], ("/a", "d"), "beyond 146 years"),
     ],
@@ -137,6 +138,13 @@ def test_bytes_that_are_no_message_are_refused():
     data = made_logs.mcap_of([(0, 5, b"{")], "json", "x", "jsonschema", b"{}", topic="/a")
     with pytest.raises(RecordingError, match="holds a message that cannot be read"):
         fields(data, ("/a", "d"))
+
+
+def test_an_excerpt_needs_a_sample_on_either_side_and_the_first_two():
+    time = np.arange(0, 110, 10)
+    kept = in_window(time, (35, 55), 0)
+    assert time[kept].tolist() == [0, 10, 30, 40, 50, 60]
+    assert in_window(time, None, 0).all()
 
 
 @pytest.mark.parametrize("window", [None, (BEGIN + 2 * 10**7, BEGIN + 3 * 10**7 - 1)])

@@ -54,10 +54,10 @@ def test_how_severe_each_beginning_is_and_that_an_end_is_information() -> None:
         assert Transition(kind, False, "x", "/y").severity == 2
 
 
-def log_file(path: Path, times: list[int], payloads: list[bytes]) -> Path:
+def log_file(path: Path, times: list[int], payloads: list[bytes], schema: str = messages.LOG) -> Path:
     parts: list[bytes] = []
     writer = McapFileWriter(type("Sink", (), {"write": staticmethod(lambda data: parts.append(bytes(data)))}), "test")
-    channel = writer.channel("/events", writer.schema(messages.schema(messages.LOG)))
+    channel = writer.channel("/events", writer.schema(messages.schema(schema)))
     writer.end_preamble()
     writer.messages(channel, times, [0] * len(times), payloads)
     writer.finish()
@@ -91,6 +91,15 @@ def test_a_time_that_only_some_messages_have_is_damage(tmp_path: Path) -> None:
     with (
         McapLog(log_file(tmp_path / "e.mcap", [1, 2], payloads)) as log,
         pytest.raises(RecordingError, match="/events"),
+    ):
+        read_events(log)
+
+
+def test_events_of_another_type_are_damage(tmp_path: Path) -> None:
+    payload = log_message(1, 1, Transition("contact", True, "a|b", "/collision"))
+    with (
+        McapLog(log_file(tmp_path / "e.mcap", [1], [payload], messages.COLLISION)) as log,
+        pytest.raises(RecordingError, match=r"topic '/events' does not hold foxglove\.Log"),
     ):
         read_events(log)
 

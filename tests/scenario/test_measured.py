@@ -97,6 +97,15 @@ def test_a_given_offset_keeps_the_scenarios_time_of_the_log(logs):
     assert mine.tolist() == theirs.tolist()
 
 
+def test_three_seconds_beside_the_scenario_are_kept_so_that_an_offset_can_be_checked(logs):
+    log = (logs / "run.csv").read_text() + "".join(f"{t};-1;20;false\n" for t in range(4_000, 90_000, 20))
+    (logs / "dense.csv").write_text(log)
+    kept = load(written(logs, f"  file: dense.csv{machine.OF_CSV}  offset: -1.25 s\n"))
+    last = float(kept.sources["dense.csv"].decode().splitlines()[-1].split(";")[0])
+    end = 1000.0 * (2.0 + 1.25 + 3.0 + 0.06)  # [ms] of the log: the scenario's end, the offset, beside it, a gap
+    assert end <= last < end + 40.0  # one more is after it
+
+
 MOVED = (
     machine.SCENARIO.split("motion:")[0]
     + "motion:\n  recorded: {RECORDED}\nsensors:"

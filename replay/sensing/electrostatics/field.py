@@ -135,6 +135,8 @@ class FieldSolver:
         body = self._body_of_shape[nodes.shape]
         own = own[np.argsort(body[own], kind="stable")]
         place(nodes, own, poses, self._posed)
+        if len(self._body_of_shape) > 1:
+            own = self._uncovered(placement, own)
         if placement.cut:
             own = own[self.potential.at(self._posed.panels.centroid[own])[1] >= RESOLVED]
         if len(own) == 0:
@@ -151,6 +153,14 @@ class FieldSolver:
         )
         areas = np.concatenate([unit.nodes.panels.area[image], nodes.panels.area[own]])
         return _above(fine, np.unique(part, return_inverse=True)[1], areas), fine
+
+    def _uncovered(self, placement: PosedBodies, own: Integers) -> Integers:
+        """Return the nodes, which are placed, whose middle lies on no earlier shape of their conductor."""
+        shape, covered = self._trees.nodes.shape[own], np.zeros(len(own), np.bool_)
+        for each in np.unique(shape):
+            at = shape == each
+            covered[at] = placement.covered(int(each), self._posed.panels.centroid[own[at]])
+        return own[~covered]
 
     def _cuts(self, poses: Floats, count: int) -> tuple[Integers, Integers]:
         """Return nodes of bodies as they are, of the unit as -1 - node: half as many, and all."""

@@ -32,6 +32,9 @@ from replay.sensing.electrostatics.spline import guided
 Solve = Callable[[int], BemReading | None]
 
 _FIRST_KEYS = 5
+_NEARBY = 4
+"""Frames on either side of a kink of which one is calm: as many kinks in a row are told apart from a bend."""
+
 _EVEN = 2.0
 """Change of ln E that counts as much as all frames of a piece."""
 
@@ -86,14 +89,14 @@ def pieces(points: Floats, state: Integers) -> list[tuple[int, int]]:
 
 
 def _kinks(points: Floats, step: Floats) -> Flags:
-    """Return at which frames (n,) a motion bends more than on both sides of them, up to three frames away."""
+    """Return at which frames (n,) a motion bends more than at some frame nearby on either side."""
     n = len(points)
     result = np.zeros(n, np.bool_)
     if n > 2:
-        bend = np.zeros(n + 6)
-        bend[4 : n + 2] = np.abs(np.diff(points, n=2, axis=0)).reshape(n - 2, -1).max(axis=1)
-        around = np.min([np.maximum(bend[3 - k : n + 3 - k], bend[3 + k : n + 3 + k]) for k in (1, 2, 3)], axis=0)
-        own = bend[3 : n + 3]
+        bend = np.zeros(n + 2 * _NEARBY)
+        bend[_NEARBY + 1 : n + _NEARBY - 1] = np.abs(np.diff(points, n=2, axis=0)).reshape(n - 2, -1).max(axis=1)
+        window = np.lib.stride_tricks.sliding_window_view(bend, _NEARBY).min(axis=1)
+        around, own = np.maximum(window[:n], window[_NEARBY + 1 :]), bend[_NEARBY : n + _NEARBY]
         result[1:-1] = (own > 3.0 * around)[1:-1] & (own[1:-1] > 0.02 * np.maximum(step[:-1], step[1:]))
     return result
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from replay.numerics import transforms
-from replay.numerics.arrays import Floats, Integers
+from replay.numerics.arrays import Flags, Floats, Integers
 from replay.sensing.electrostatics.body import ConductorBody
 from replay.sensing.electrostatics.gap import on_surface
 from replay.sensing.electrostatics.panels import Panels, chosen, moved
@@ -75,17 +75,21 @@ class PosedBodies:
 
     def uncovered(self, parts: list[Panels], near_unit: cKDTree) -> list[Panels]:
         """Return, of the panels of each shape, those that count."""
-        conductor, body_of, result = self.conductor_of_shape, self.body_of_shape, []
-        places = [(body, k) for body, each in enumerate(self.bodies) for k in range(len(each.shapes))]
-        for second, part in enumerate(parts):
-            counts = np.ones(len(part.area), np.bool_)
+        result = []
+        for shape, part in enumerate(parts):
+            counts = ~self.covered(shape, part.centroid)
             if self.cut:
                 counts &= near_unit.query(part.centroid)[0] >= RESOLVED
-            for first in range(second):
-                if conductor[first] != conductor[second]:
-                    continue
-                body, k = places[first]
-                points = transforms.apply(transforms.invert(self.poses[body_of[first]]), part.centroid)
-                counts &= ~on_surface(points, *self.bodies[body].surface(k), TOUCHING)
             result.append(chosen(part, counts) if not counts.all() else part)
+        return result
+
+    def covered(self, shape: int, points: Floats) -> Flags:
+        """Return which points (n, 3) of a shape, in the unit's frame, lie on an earlier shape of its conductor."""
+        conductor, body_of = self.conductor_of_shape, self.body_of_shape
+        places = [(body, k) for body, each in enumerate(self.bodies) for k in range(len(each.shapes))]
+        result = np.zeros(len(points), np.bool_)
+        for first in np.flatnonzero(conductor[:shape] == conductor[shape]):
+            body, k = places[first]
+            local = transforms.apply(transforms.invert(self.poses[body_of[first]]), points)
+            result |= on_surface(np.ascontiguousarray(local), *self.bodies[body].surface(k), TOUCHING)
         return result

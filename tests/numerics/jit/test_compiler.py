@@ -73,6 +73,7 @@ def said(code, cache, *arguments):
     return done.stdout, [line for line in done.stderr.splitlines() if "compil" not in line or "slower" in line]
 
 
+@pytest.mark.compiled
 def test_kernels_by_the_public_decorator_say_the_same_to_the_last_digit(tmp_path):
     fast, _ = said(INTEGRALS, {})
     slow, _ = said(FAKED + INTEGRALS, {"NUMBA_CACHE_DIR": str(tmp_path)})
@@ -227,6 +228,7 @@ for each in (*entries_of(calipers), convexity._winds_once):
 """
 
 
+@pytest.mark.compiled
 def test_what_is_left_out_before_llvm_changes_no_code(tmp_path):
     """Kernels that allocate, sort and gather: operations as often as by all of numba's passes."""
     found = []

@@ -6,8 +6,20 @@ from replay.geometry.tree import triangle_tree
 from replay.numerics import transforms
 from replay.sensing.capacitive import plate_integral
 from replay.sensing.capacitive.tree.cluster_bounds import _over_borders
-from replay.sensing.capacitive.tree.clusters import make_clusters
+from replay.sensing.capacitive.tree.clusters import _largest_variance, make_clusters
 from replay.sensing.capacitive.tree.tree_sum import COUNTS, sum_tree
+
+
+def test_the_largest_variance_is_bounded_and_at_most_2_percent_above():
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(500, 9, 3)) * 10.0 ** rng.uniform(-3.0, 2.0, (500, 1, 3))
+    points[:100, :, 2] = -points[:100, :, 1]  # flat, and crosswise: entries of both signs
+    matrices = np.einsum("nki,nkj->nij", points, points)
+    written = matrices[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    true = np.linalg.eigvalsh(matrices)[:, -1]
+    bound = _largest_variance(written)
+    assert (bound >= true * (1.0 - 1e-13)).all() and (bound <= 1.02 * true).all()
+    assert _largest_variance(np.zeros((1, 6))) == 0.0
 
 
 def test_the_depth_over_borders_is_at_most_its_bound():

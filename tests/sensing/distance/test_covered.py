@@ -29,6 +29,13 @@ def test_a_sensor_on_a_part_that_it_does_not_ignore_is_noted(tmp_path):
     )
 
 
+def test_what_is_touched_at_first_alone_is_not_noted(tmp_path):
+    left = TEXT.replace("eye: {parent: arm}", "eye: {}").replace("30 s", "10 s")  # all in one block
+    scenario = load_sources("mounted.yaml", {"mounted.yaml": left.encode()})
+    result = run_case(CaseOrder(scenario, tmp_path, rrd=False), lambda done, total: None)
+    assert not any("touches" in note for note in result.notes)
+
+
 def test_a_sensor_inside_a_body_reads_its_surface_and_says_so(tmp_path):
     text = TEXT.replace(
         "away: {link: eye, pose: {xyz: [0, 0, 0.1]}", "away: {link: eye, ignore: [arm], pose: {xyz: [0, 0, 0.1]}"
