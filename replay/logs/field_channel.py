@@ -108,7 +108,7 @@ class FieldChannel:
         values = {path: np.full(count, np.nan) for path in self.paths}
         there = {path: np.zeros(count, dtype=np.bool_) for path in self.paths}
         stamps = np.zeros(count, dtype=np.int64)
-        groups = siblings(self.paths)
+        groups = siblings(self.paths, count)
         alone = {path: steps for path, steps in self.paths.items() if isinstance(steps.steps[-1], tuple)}
         for k, data in enumerate(run.messages()):
             message = self._decoded(data)
@@ -121,15 +121,12 @@ class FieldChannel:
             for group in groups:
                 group.take(k, message)
         for group in groups:
-            at, table = np.array(group.at, dtype=np.int64), group.table()
             for column, path in enumerate(group.paths):
-                if table is not None:
-                    there[path][at] = True
-                    values[path][at] = table[:, column]
-                else:
-                    there[path][at] = [row[column] is not ABSENT for row in group.rows]
-                    found = [self._number(path, row[column]) for row in group.rows if row[column] is not ABSENT]
-                    values[path][there[path]] = found
+                values[path][:] = group.table[:, column]
+                there[path][:] = group.there
+                for k, row in group.odd.items():
+                    there[path][k] = row[column] is not ABSENT
+                    values[path][k] = self._number(path, row[column]) if there[path][k] else np.nan
         for path in self.paths:
             self.values[path].append(values[path])
             self.there[path].append(there[path])

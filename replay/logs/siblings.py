@@ -2,70 +2,66 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from replay.logs.field_path import ABSENT, FieldPath, below
-from replay.numerics.arrays import Floats
 
 
-@dataclass(eq=False)
 class Siblings:
-    """Some values of one list or mapping in messages; of many plain numbers one array is made.
+    """Some values of one list or mapping in messages.
 
     Attributes:
-        parent: where the list or mapping is.
-        steps: from there to the values: all of them numbers of entries, or names.
         paths: of the values, as they are written.
-        at: which messages have it.
-        rows: its values in each of these, ABSENT where there is none.
+        there: (n,) whether a message has the list or mapping.
+        table: (n, values) of those in which all values are numbers.
+        odd: the values of the others, by message; ABSENT where there is none.
     """
 
-    parent: FieldPath
-    steps: tuple[int | str, ...]
-    paths: tuple[str, ...]
-    at: list[int] = field(default_factory=list)
-    rows: list[Sequence[Any]] = field(default_factory=list)
+    def __init__(self, parent: FieldPath, steps: Mapping[str, int | str], count: int) -> None:
+        """Make room.
 
-    def __post_init__(self) -> None:
-        numbers = [step for step in self.steps if isinstance(step, int)]
+        Args:
+            parent: where the list or mapping is.
+            steps: from there to each value, by its path: all of them numbers of entries, or names.
+            count: of the messages.
+        """
+        self.paths = tuple(steps)
+        self.there = np.zeros(count, dtype=np.bool_)
+        self.table = np.full((count, len(steps)), np.nan)
+        self.odd: dict[int, Sequence[Any]] = {}
+        self._parent = parent
+        self._steps = tuple(steps.values())
+        numbers = [step for step in self._steps if isinstance(step, int)]
         self._kind: Any = list if numbers else dict
         in_a_row = bool(numbers) and numbers == [*range(numbers[0], numbers[0] + len(numbers))]
         self._part = slice(numbers[0], numbers[-1] + 1) if in_a_row else None
+        self._row = struct.Struct(f"{len(steps)}d")
 
     def take(self, k: int, message: Any) -> None:
         """Take the values of message k."""
-        found = self.parent.value(message)
+        found = self._parent.value(message)
         if found is ABSENT:
             return
-        self.at.append(k)
+        self.there[k] = True
         if type(found) is self._kind:
             try:
-                row = found[self._part] if self._part else tuple(map(found.__getitem__, self.steps))
-            except (IndexError, KeyError):
-                row = ()
-            if len(row) == len(self.steps):
-                self.rows.append(row)
+                row = found[self._part] if self._part else map(found.__getitem__, self._steps)
+                self._row.pack_into(self.table.data, k * self._row.size, *row)
                 return
-        self.rows.append([below(found, step, None) for step in self.steps])  # some are missing
-
-    def table(self) -> Floats | None:
-        """Return the rows as an array; None if not all are plain numbers."""
-        try:
-            table = np.array(self.rows)
-        except ValueError:  # lists of several lengths
-            return None
-        return table.astype(np.float64) if table.ndim == 2 and table.dtype.kind in "bif" else None
+            except (IndexError, KeyError, OverflowError, struct.error):
+                pass  # some are missing, or no number that is one here
+        self.odd[k] = [below(found, step, None) for step in self._steps]
 
 
-def siblings(paths: Mapping[str, FieldPath]) -> list[Siblings]:
+def siblings(paths: Mapping[str, FieldPath], count: int) -> list[Siblings]:
     """Return the paths by what their values stand in; those that end in the name of an entry are left out."""
     found: dict[tuple[FieldPath, type], dict[str, int | str]] = {}
     for path, written in paths.items():
         *above, last = written.steps
         if not isinstance(last, tuple):
             found.setdefault((FieldPath("", tuple(above)), type(last)), {})[path] = last
-    return [Siblings(parent, tuple(steps.values()), tuple(steps)) for (parent, _), steps in found.items()]
+    return [Siblings(parent, steps, count) for (parent, _), steps in found.items()]
