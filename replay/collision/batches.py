@@ -33,7 +33,7 @@ class Batch:
         rows: (c, 4) for `broad.sieve`.
         relative: poses of their links.
         bases: links of their first bodies, where boxes turn with them.
-        ways: (c, 4) rows of `intervals.Course.ways`; none if nothing is asked of intervals.
+        ways: (c, 4) rows of `ways.Ways`; none if nothing is asked of intervals.
     """
 
     columns: Integers

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from replay.collision.counters import Counters
 from replay.collision.crossing_look import Questions
 from replay.collision.interval_proof import Answers
 from replay.collision.pair_frames import PairFrames
+from replay.collision.relative import RelativePoses
 from replay.collision.support import Sets, make_sets
 from replay.collision.way_sieve import roots_of
 from replay.collision.way_steps import Chains
@@ -24,9 +24,6 @@ from replay.kinematics.motion import Motion
 from replay.kinematics.timeline import timeline
 from replay.kinematics.travel import link_travel
 from replay.numerics.arrays import Bytes, Flags, Floats, Integers
-
-if TYPE_CHECKING:
-    from replay.collision.batches import Batch
 
 RESOLUTION = 1_000
 """Longest bracket of a moment that is aimed at [ns]."""
@@ -181,17 +178,18 @@ class Intervals:
         near = self._first[pairs] + shared[:, None]
         return np.concatenate([near, self._first[pairs] if self._volumes.kind == AABB else near], axis=1)
 
-    def sorted_out(self, batch: Batch, course: Course, *, quiet: bool) -> Sorted:
-        """Return what the stretches of a block hold of a batch's pairs: what is not NEAR is clear in them.
+    def sorted_out(
+        self, pairs: Integers, rows: Integers, relative: RelativePoses, course: Course, *, quiet: bool
+    ) -> Sorted:
+        """Return what the stretches of a block hold of pairs: what is not NEAR is clear in them.
 
         Args:
-            batch: the pairs.
+            pairs, rows, relative: see `batches.Batch`, where rows are called ways.
             course: of the block.
             quiet: whether what is known of distances at the frames is our own.
         """
-        pairs, rows = batch.rows, batch.ways
         shape = len(pairs), len(course.share)
-        wanted = np.zeros((batch.relative.count, len(course.time)), dtype=bool)
+        wanted = np.zeros((relative.count, len(course.time)), dtype=bool)
         if not self._savings:
             return Sorted(pairs, rows, np.full(shape, NEAR, dtype=np.uint8), wanted, course)
         kinds = np.empty(shape, dtype=np.uint8)
@@ -199,7 +197,7 @@ class Intervals:
             self._roots,
             self._volumes,
             pairs,
-            batch.relative.of(course.middle),
+            relative.of(course.middle),
             rows,
             course.swept,
             len(course.time) - 1,

@@ -96,7 +96,10 @@ def apart_by_pieces(
         row_i, row_j = bodies.node_first[a] + i, bodies.node_first[b] + j
         gap = -way
         for end in range(2):
-            gap += max(box_gap(bodies, row_i, row_j, e.rotation[end], e.translation[end], rounding), 0.0)
+            apart = box_gap(
+                bodies.node_center, bodies.node_half, row_i, row_j, e.rotation[end], e.translation[end], rounding
+            )
+            gap += max(apart, 0.0)
         if gap > 0.0:
             bound = min(bound, 0.5 * gap)
             continue

@@ -276,7 +276,7 @@ class CollisionPipeline:
             frames = self._frames.decide(self.narrow_phase, batch, batch.rows, poses)
             return _Found(batch.columns, frames, 0, Crossings.none())
         # of what the other engine says at the frames nothing is known
-        found = self._intervals.sorted_out(batch, course, quiet=self._own is None)
+        found = self._intervals.sorted_out(batch.rows, batch.ways, batch.relative, course, quiet=self._own is None)
         rows = batch.rows[found.near]
         self.counters.pruned_by_block += (len(poses.local) - lead) * (len(batch.rows) - len(rows))
         frames = self._frames.decide(self.narrow_phase, batch, rows, poses, found)

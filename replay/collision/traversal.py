@@ -30,18 +30,24 @@ BOXES, QUERIES, ITERATIONS, IN_DOUBLE_DOUBLE = range(COUNTS)
 
 
 @inlined_kernel
-def box_gap(bodies: Bodies, i: int, j: int, rotation: Floats, translation: Floats, slack: float) -> float:
-    """Return a lower bound on the distance [m] of node i of body A and node j of body B (global rows), B at (R, t)."""
-    ca, wa = bodies.node_center, bodies.node_half
+def box_gap(center: Floats, half: Floats, i: int, j: int, rotation: Floats, translation: Floats, slack: float) -> float:
+    """Return a lower bound on the distance [m] of box i of body A and box j of body B, B at (R, t).
+
+    Args:
+        center, half: (m, 3) [m] of all boxes, such as the nodes of `Bodies`.
+        i, j: rows.
+        rotation, translation: (3, 3) and (3,) of T_a_b.
+        slack: is subtracted [m].
+    """
     r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
     r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
     r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
-    bx, by, bz = ca[j, 0], ca[j, 1], ca[j, 2]
-    dx = r00 * bx + r01 * by + r02 * bz + translation[0] - ca[i, 0]
-    dy = r10 * bx + r11 * by + r12 * bz + translation[1] - ca[i, 1]
-    dz = r20 * bx + r21 * by + r22 * bz + translation[2] - ca[i, 2]
-    ax, ay, az = wa[i, 0], wa[i, 1], wa[i, 2]
-    bx, by, bz = wa[j, 0], wa[j, 1], wa[j, 2]
+    bx, by, bz = center[j, 0], center[j, 1], center[j, 2]
+    dx = r00 * bx + r01 * by + r02 * bz + translation[0] - center[i, 0]
+    dy = r10 * bx + r11 * by + r12 * bz + translation[1] - center[i, 1]
+    dz = r20 * bx + r21 * by + r22 * bz + translation[2] - center[i, 2]
+    ax, ay, az = half[i, 0], half[i, 1], half[i, 2]
+    bx, by, bz = half[j, 0], half[j, 1], half[j, 2]
     # along A's axes
     x = max(0.0, abs(dx) - ax - abs(r00) * bx - abs(r01) * by - abs(r02) * bz)
     y = max(0.0, abs(dy) - ay - abs(r10) * bx - abs(r11) * by - abs(r12) * bz)
@@ -85,6 +91,7 @@ def closest(
     size = bodies.reach[a] + bodies.reach[b]
     size += math.sqrt(translation[0] ** 2 + translation[1] ** 2 + translation[2] ** 2)
     slack = 2.0 * ROUNDING * size
+    center, half = bodies.node_center, bodies.node_half
     best, found, undecided = limit, False, False
     nearest = np.inf
     tried_a, tried_b = seed[0], seed[1]
@@ -93,7 +100,7 @@ def closest(
     waiting = 0
     if tried_a < 0:
         nodes[0, 0], nodes[0, 1] = 0, 0
-        gaps[0] = box_gap(bodies, bodies.node_first[a], bodies.node_first[b], rotation, translation, slack)
+        gaps[0] = box_gap(center, half, bodies.node_first[a], bodies.node_first[b], rotation, translation, slack)
         waiting = 1
         counts[BOXES] += 1
     first = tried_a >= 0
@@ -107,11 +114,11 @@ def closest(
             child_i, child_j = bodies.tree.second[row_i], bodies.tree.second[row_j]
             if child_i >= 0 or child_j >= 0:
                 # split the larger of the two; the nearer child goes on top
-                split_a = child_j < 0 or (child_i >= 0 and _larger(bodies.node_half, row_i, row_j))
+                split_a = child_j < 0 or (child_i >= 0 and _larger(half, row_i, row_j))
                 i0, i1, j0, j1 = (i + 1, child_i, j, j) if split_a else (i, i, j + 1, child_j)
                 shift_a, shift_b = bodies.node_first[a], bodies.node_first[b]
-                gap0 = box_gap(bodies, shift_a + i0, shift_b + j0, rotation, translation, slack)
-                gap1 = box_gap(bodies, shift_a + i1, shift_b + j1, rotation, translation, slack)
+                gap0 = box_gap(center, half, shift_a + i0, shift_b + j0, rotation, translation, slack)
+                gap1 = box_gap(center, half, shift_a + i1, shift_b + j1, rotation, translation, slack)
                 counts[BOXES] += 2
                 if gap0 < gap1:
                     i0, i1, j0, j1, gap0, gap1 = i1, i0, j1, j0, gap1, gap0
@@ -150,7 +157,7 @@ def closest(
         if first:
             first = False
             nodes[0, 0], nodes[0, 1] = 0, 0
-            gaps[0] = box_gap(bodies, bodies.node_first[a], bodies.node_first[b], rotation, translation, slack)
+            gaps[0] = box_gap(center, half, bodies.node_first[a], bodies.node_first[b], rotation, translation, slack)
             waiting = 1
             counts[BOXES] += 1
     if undecided:

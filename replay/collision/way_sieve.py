@@ -39,11 +39,11 @@ _SLACK = 2.0**-43
 
 
 class Roots(NamedTuple):
-    """What is asked of B bodies here, a row each, called as in `Bodies`: the boxes at the roots of their trees."""
+    """What is asked of B bodies here, a row each: the boxes at the roots of their trees, and how far they reach."""
 
-    node_center: Floats  # (B, 3) [m]
-    node_half: Floats  # (B, 3) [m]
-    reach: Floats  # (B,) [m]
+    center: Floats  # (B, 3) [m]
+    half: Floats  # (B, 3) [m]
+    reach: Floats  # (B,) [m], as in `Bodies`
 
 
 ROOTS_TYPE = record(Roots, float64[:, ::1], float64[:, ::1], float64[::1])
@@ -158,8 +158,8 @@ def _ratio(roots: Roots, volumes: Volumes, body: int) -> float:
     """Return how much larger a sphere about the body's centre is that holds the box at the root of its tree."""
     square, away = 0.0, 0.0
     for i in range(3):
-        square += roots.node_half[body, i] ** 2
-        away += (roots.node_center[body, i] - volumes.center[body, i]) ** 2
+        square += roots.half[body, i] ** 2
+        away += (roots.center[body, i] - volumes.center[body, i]) ** 2
     radius: float = volumes.radius[body]
     return (math.sqrt(square) + math.sqrt(away)) * (1.0 + 2.0**-40) / radius if radius > 0.0 else math.inf
 
@@ -172,4 +172,4 @@ def root_gap(roots: Roots, a: int, b: int, pose: Floats, size: float, rotation: 
         for j in range(3):
             rotation[i, j] = pose[i, j]
     slack = 2.0 * ROUNDING * size
-    return float(box_gap(roots, a, b, rotation, translation, slack))  # type: ignore[arg-type]  # reads boxes alone
+    return float(box_gap(roots.center, roots.half, a, b, rotation, translation, slack))

@@ -41,8 +41,9 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
                 if is_address(argument.type):
                     for promise in ("noalias", "captures(none)"):
                         argument.add_attribute(promise)
-                    argument.attributes.dereferenceable = argument.type.pointee.get_abi_size(self._codegen.target_data)
-                    argument.attributes.align = 8
+                    layout, target = argument.type.pointee, self._codegen.target_data
+                    argument.attributes.dereferenceable = layout.get_abi_size(target)
+                    argument.attributes.align = layout.get_abi_alignment(target)
         super().add_ir_module(module)
 
     def add_llvm_module(self, module: Any) -> None:
